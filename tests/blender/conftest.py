@@ -41,7 +41,7 @@ LONG_TERM = {
     "test_auto_mix",
     *("test_bulge_limit", "test_character", "test_corrective_key", "test_ddm", "test_delta_mush"),
     *("test_diagnostics_panel", "test_flex", "test_flex_panel", "test_found_where_looked_for"),
-    *("test_golden", "test_heat_map", "test_ik"),
+    *("test_golden", "test_heat_map"),
     *("test_inbetween", "test_lesson", "test_mask_groups", "test_mending", "test_method_parameters"),
     *("test_mix", "test_precomputation"),
     *("test_preferences", "test_recommended", "test_scale_rule", "test_sdef", "test_small_meshes"),

@@ -15,7 +15,6 @@
 
 #include "polygons.h"
 #include "scene.h"
-#include "sinew/ik/solver.h"
 #include "sinew/bulge_limit.h"
 #include "sinew/delta_mush.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
@@ -352,28 +351,6 @@ TEST(Bones, of_high_numbers_take_no_memory) {
     }
     // The table that sorts the numbers has 4 bytes for each and is freed afterwards.
     EXPECT_LT(sizes[1], sizes[0] + 5 * kMaxBones);
-}
-
-// Includes limits, a bend and a second try.
-TEST(InverseKinematics, allocates_nothing_and_locks_nothing) {
-    const std::vector<std::int32_t> parents{-1, 0, 1};
-    std::vector<BoneLimits> limits(3);
-    limits[1][1].is_locked = true;
-    limits[1][0] = {.is_limited = true, .min = 0.0, .max = 2.0};
-    const std::vector<IkEffector> effectors{{.bone = 2, .rotation_weight = 0.5}};
-    IkSolver solver(Skeleton(parents), limits, effectors);
-    const DualQuat<double> next = to_dual_quat(QuatVec<double>{{1, 0, 0, 0}, {0, 1, 0}});
-    const std::vector<DualQuat<double>> rest{{}, next, next};
-    const std::vector<Vec3<double>> tips{{0, 1, 0}};
-    std::vector<Quat<double>> rotations(3, Quat<double>(1, 0, 0, 0));
-    const int before = allocations;
-    const int locks_before = locks;
-    for (int i = 0; i < 20; ++i) {
-        const std::array goals{to_dual_quat(QuatVec<double>{{1, 0, 0, 0}, {0.1 * i, 2.0 - 0.2 * i, 0.0}})};
-        EXPECT_TRUE(solver.solve({{}, rest, tips, goals, {}}, rotations));
-    }
-    EXPECT_EQ(allocations, before);
-    EXPECT_EQ(locks, locks_before);
 }
 
 }  // namespace

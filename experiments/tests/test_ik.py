@@ -1,12 +1,13 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects sinew.ik: compared with scipy's least squares, the law of cosines, and plain matrices for the
-poses; and what holds of every solution: limits, trees, poles, degenerate chains, invariance."""
+"""Protects inverse kinematics: compared with scipy's least squares, the law of cosines, and plain matrices
+for the poses; and what holds of every solution: limits, trees, poles, degenerate chains, invariance."""
 
 import numpy as np
 import pytest
+from future_work import ik
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
-from sinew import ik, quat_vec
+from sinew import quat_vec
 
 CHAINS = 120
 

@@ -1,6 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Compares rigid fits with scipy and with solving in two steps: times, errors for noisy data,
-docs/fits.svg."""
+"""Compares rigid fits with scipy and with solving in two steps: times, errors for noisy data, fits.svg."""
 
 from __future__ import annotations
 
@@ -11,12 +10,13 @@ import matplotlib
 import numpy as np
 import sinew
 from scipy.spatial.transform import RigidTransform, Rotation
-from sinew import fit
+
+from future_work import fit
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+HERE = Path(__file__).resolve().parent
 SIZES = (10, 100, 1_000, 10_000)
 SETS = 2_000
 NOISES = (0.001, 0.003, 0.01, 0.03, 0.1)
@@ -153,7 +153,7 @@ def draw(spreads: dict, eyes: dict, averages: dict) -> None:
     for axes in (first, second, third):
         axes.grid(alpha=0.3)
         axes.legend()
-    figure.savefig(DOCS / "fits.svg", metadata={"Date": None})
+    figure.savefig(HERE / "fits.svg", metadata={"Date": None})
 
 
 def main() -> None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks with 50 digits: sinew.fit. Verifies the conditions that make a fit the best one, in numbers that
-do not round."""
+"""Checks with 50 digits: future_work.fit. Verifies the conditions that make a fit the best one, in numbers
+that do not round."""
 
 import functools
 

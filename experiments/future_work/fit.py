@@ -6,7 +6,8 @@ numpy. All computation is in float64. `is_defined` says whether the result is th
 one of the best, finite. Negative weights are refused.
 """
 
-from ._native.fit import average, hand_eye, rigid
-from ._types import Averaged, HandEye, RigidFit
+from future_work_native.fit import average, hand_eye, rigid
+
+from .types import Averaged, HandEye, RigidFit
 
 __all__ = ["Averaged", "HandEye", "RigidFit", "average", "hand_eye", "rigid"]

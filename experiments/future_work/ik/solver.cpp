@@ -6,7 +6,7 @@
 // axes; W contains the stiffness. l follows the error (Sugihara 2011), so steps near a goal are Newton steps, and
 // steps towards unreachable goals do not oscillate. A step that increases the error is undone (Levenberg 1944,
 // Marquardt 1963). Axes at a limit that a step would exceed are left out of that step.
-#include "sinew/ik/solver.h"
+#include "future_work/ik/solver.h"
 
 #include <algorithm>
 #include <limits>

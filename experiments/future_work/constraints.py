@@ -6,11 +6,11 @@ from collections.abc import Collection
 import bpy
 import numpy as np
 from mathutils import Matrix, Vector
-from sinew.ik import Effector
+from sinew_addon.base.errors import SinewError
+from sinew_addon.io import spaces
 
-from ..base.errors import SinewError
-from ..skinning.ik import Posed, Tree
-from . import spaces
+from .chains import Posed, Tree
+from .ik import Effector
 
 
 def read_trees(armature: bpy.types.Object, only: Collection[str] | None = None) -> list[Tree]:
@@ -161,8 +161,8 @@ def _check(armature: bpy.types.Object, tree: Tree) -> None:
             acts = not constraint.mute and constraint.influence > 0.0
             if acts and (name, constraint.name) not in own and constraint.type != "IK":
                 raise SinewError(
-                    f"{armature.name}: {name} has the constraint {constraint.name} besides, which keys can "
-                    "not keep; mute it, or bake with Object > Animation > Bake Action"
+                    f"{armature.name}: {name} has the constraint {constraint.name} besides, which Sinew does "
+                    "not solve; mute it"
                 )
 
 

@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
+#include "future_work/ik/solver.h"
+#include "future_work/module.h"
 #include "interpolations.h"
-#include "module.h"
-#include "sinew/ik/solver.h"
 
 namespace sinew::bindings {
 namespace {
 
-using Solution = Typed<"sinew._types.Solution">;
+using Solution = Typed<"future_work.types.Solution">;
 
 struct Solver {
     IkSolver solver;
@@ -53,9 +53,9 @@ std::vector<BoneLimits> limits_of(const py::object& locked, const py::object& li
     return result;
 }
 
-using Effectors = Typed<"collections.abc.Sequence[sinew.ik.Effector]">;
+using Effectors = Typed<"collections.abc.Sequence[future_work.ik.Effector]">;
 
-/// A tuple that is, or could be, a sinew.ik.Effector.
+/// A tuple that is, or could be, a future_work.ik.Effector.
 IkEffector checked_effector(const py::handle& value) {
     if (!py::isinstance<py::tuple>(value) || py::len(value) != 5) {
         fail("effectors", "an Effector", describe(value));

@@ -1,16 +1,17 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Inverse kinematics over frames: the problem of Blender's constraints, solved by `sinew.ik`."""
+"""Inverse kinematics over frames: the problem of Blender's constraints, solved by `future_work.ik`."""
 
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from sinew import affine, ik, quat, quat_vec
+from sinew import affine, quat, quat_vec
+from sinew_addon.base.errors import SinewError
+from sinew_addon.skinning.vectors import unit
 
-from ..base.errors import SinewError
-from .vectors import unit
+from . import ik
 
-# The iterations of commands and the panel: Blender's own limit, which the solver never nearly reaches.
+# Blender's own limit, which the solver never nearly reaches.
 ITERATIONS = 500
 
 
@@ -22,7 +23,7 @@ class Tree:
     parents      int32 [bones], -1 for the root
     rest         float64 [bones, 3, 3], each bone's axes at rest, relative to its parent's
     constraints  for each effector: the bone that has the constraint, and the constraint's name
-    effectors    of sinew.ik
+    effectors    of future_work.ik
     """
 
     bones: tuple[str, ...]
@@ -64,7 +65,7 @@ class Posed(NamedTuple):
 
 
 class Problem(NamedTuple):
-    """Arguments of sinew.ik.Solver.solve(), and the scale of each bone's axes, [frames, bones, 3]."""
+    """Arguments of ik.Solver.solve(), and the scale of each bone's axes, [frames, bones, 3]."""
 
     rest: np.ndarray
     tips: np.ndarray

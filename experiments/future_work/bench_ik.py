@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Compares inverse kinematics with Blender's constraint, alternately in one process: times of a solve,
-remaining errors, how smoothly bones move; docs/ik.svg."""
+remaining errors, how smoothly bones move; ik.svg."""
 
 from __future__ import annotations
 
@@ -11,15 +11,15 @@ import bpy
 import common
 import matplotlib
 import numpy as np
-import sinew
 from sinew import affine, quat
-from sinew_addon.io import ik_io
-from sinew_addon.skinning import ik as core
+
+from future_work import chains, constraints
+from future_work.types import Solution
 
 matplotlib.use("svg")
 import matplotlib.pyplot as plt
 
-DOCS = Path(__file__).resolve().parents[1] / "docs"
+HERE = Path(__file__).resolve().parent
 BONES = (2, 5, 10)
 KINDS = ("free", "limited")
 CHAINS = 100
@@ -86,13 +86,15 @@ def times(bones: int, kind: str, seconds: float) -> dict:
     armature, targets = make_chains(bones, kind, CHAINS)
     place_targets(targets, bones, np.random.default_rng(bones))
     bpy.context.view_layer.update()
-    trees = ik_io.read_trees(armature)
-    theirs = np.stack([ik_io.read_posed(armature, tree).bones for tree in trees]).astype(float)
+    trees = constraints.read_trees(armature)
+    theirs = np.stack([constraints.read_posed(armature, tree).bones for tree in trees]).astype(float)
     names = [pair for tree in trees for pair in tree.constraints]
-    ik_io.set_muted(armature, names, True)
+    constraints.set_muted(armature, names, True)
     bpy.context.view_layer.update()
     # All trees have the same bones and limits, so they can be solved like frames of one tree.
-    problem = core.problem_of(trees[0], core.stack([ik_io.read_posed(armature, tree) for tree in trees]))
+    problem = chains.problem_of(
+        trees[0], chains.stack([constraints.read_posed(armature, tree) for tree in trees])
+    )
     solver = trees[0].solver()
 
     def update() -> float:
@@ -103,7 +105,7 @@ def times(bones: int, kind: str, seconds: float) -> dict:
             bpy.context.view_layer.update()
         return (time.process_time() - began) / 3
 
-    def solve(tolerance: float) -> sinew.ik.Solution:
+    def solve(tolerance: float) -> Solution:
         return solver.solve(
             problem.rest,
             problem.tips,
@@ -111,7 +113,7 @@ def times(bones: int, kind: str, seconds: float) -> dict:
             rotations=problem.rotations,
             root=problem.root,
             tolerance=tolerance,
-            iterations=core.ITERATIONS,
+            iterations=chains.ITERATIONS,
         )
 
     tolerances = (1e-3, 1e-6)
@@ -119,9 +121,9 @@ def times(bones: int, kind: str, seconds: float) -> dict:
     with_it, without = [], []
     end = time.perf_counter() + seconds
     while time.perf_counter() < end or len(taken["blender"]) < 5:
-        ik_io.set_muted(armature, names, False)
+        constraints.set_muted(armature, names, False)
         with_it.append(update() / CHAINS)
-        ik_io.set_muted(armature, names, True)
+        constraints.set_muted(armature, names, True)
         without.append(update() / CHAINS)
         taken["blender"].append(with_it[-1] - without[-1])
         for tolerance in tolerances:
@@ -133,14 +135,14 @@ def times(bones: int, kind: str, seconds: float) -> dict:
         low, median, high = np.percentile(turns, [25, 50, 75]) * 1e6
         if name == "blender":
             errors, iterations, least = (
-                core.tip_errors(trees[0], problem, theirs),
+                chains.tip_errors(trees[0], problem, theirs),
                 None,
                 min(with_it) - min(without),
             )
         else:
             solution = solve(float(name.split()[1]))
-            matrices = core.matrices_of(trees[0], problem, solution.rotations)
-            errors = core.tip_errors(trees[0], problem, matrices)
+            matrices = chains.matrices_of(trees[0], problem, solution.rotations)
+            errors = chains.tip_errors(trees[0], problem, matrices)
             iterations, least = float(np.mean(solution.iterations)), min(turns)
         found[name] = {
             "median": median,
@@ -158,23 +160,23 @@ def times(bones: int, kind: str, seconds: float) -> dict:
 def animated(bones: int, kind: str) -> dict:
     """{solver: errors of frames, angular acceleration} with a target on a smooth curve within reach."""
     armature, (target,) = make_chains(bones, kind, 1)
-    tree = ik_io.read_trees(armature)[0]
+    tree = constraints.read_trees(armature)[0]
     theirs, posed = [], []
     for frames, mute in ((theirs, False), (posed, True)):
-        ik_io.set_muted(armature, tree.constraints, mute)
+        constraints.set_muted(armature, tree.constraints, mute)
         for frame in range(FRAMES):
             phase = 2.0 * np.pi * frame / FRAMES
             target.location = bones * np.array(
                 [0.45 * np.sin(2 * phase), 0.35 * np.cos(phase) + 0.2, 0.5 + 0.25 * np.sin(phase)]
             )
             bpy.context.view_layer.update()
-            frames.append(ik_io.read_posed(armature, tree))
-    problem = core.problem_of(tree, core.stack(posed))
-    matrices = {"blender": core.stack(theirs).bones.astype(float)}
-    matrices["sinew"] = core.matrices_of(tree, problem, core.solve(tree, problem).rotations)
+            frames.append(constraints.read_posed(armature, tree))
+    problem = chains.problem_of(tree, chains.stack(posed))
+    matrices = {"blender": chains.stack(theirs).bones.astype(float)}
+    matrices["sinew"] = chains.matrices_of(tree, problem, chains.solve(tree, problem).rotations)
     return {
         solver: {
-            "errors": core.tip_errors(tree, problem, of).tolist(),
+            "errors": chains.tip_errors(tree, problem, of).tolist(),
             "acceleration": angular_acceleration(of),
         }
         for solver, of in matrices.items()
@@ -204,7 +206,7 @@ def draw(spreads: dict, motions: dict) -> None:
     for axes in (first, second, third):
         axes.grid(alpha=0.3)
         axes.legend()
-    figure.savefig(DOCS / "ik.svg", metadata={"Date": None})
+    figure.savefig(HERE / "ik.svg", metadata={"Date": None})
 
 
 def main() -> None:

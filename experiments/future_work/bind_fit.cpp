@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <algorithm>
 
+#include "future_work/fit/average.h"
+#include "future_work/fit/hand_eye.h"
+#include "future_work/fit/rigid.h"
+#include "future_work/module.h"
 #include "interpolations.h"
-#include "module.h"
-#include "sinew/fit/average.h"
-#include "sinew/fit/hand_eye.h"
-#include "sinew/fit/rigid.h"
 
 namespace sinew::bindings {
 namespace {
@@ -86,10 +86,11 @@ py::object fit_items(const std::array<py::object, 6>& values) {
     });
 }
 
-NamedTuple<"RigidFit"> rigid(const ArrayLike& source, const ArrayLike& target,
-                             const OptionalArrayLike& weights, const OptionalArrayLike& source_directions,
-                             const OptionalArrayLike& target_directions,
-                             const OptionalArrayLike& direction_weights) {
+Typed<"future_work.types.RigidFit[typing.Any]"> rigid(const ArrayLike& source, const ArrayLike& target,
+                                                      const OptionalArrayLike& weights,
+                                                      const OptionalArrayLike& source_directions,
+                                                      const OptionalArrayLike& target_directions,
+                                                      const OptionalArrayLike& direction_weights) {
     const auto values = promoted<6>(
         {"source", "target", "weights", "source_directions", "target_directions", "direction_weights"},
         {source, target, weights, source_directions, target_directions, direction_weights});
@@ -134,8 +135,8 @@ py::object hand_eye_items(const std::array<py::object, 3>& values) {
     });
 }
 
-NamedTuple<"HandEye"> solve_hand_eye(const ArrayLike& a, const ArrayLike& b,
-                                     const OptionalArrayLike& weights) {
+Typed<"future_work.types.HandEye[typing.Any]"> solve_hand_eye(const ArrayLike& a, const ArrayLike& b,
+                                                              const OptionalArrayLike& weights) {
     const auto values = promoted<3>({"a", "b", "weights"}, {a, b, weights});
     return with_layout(values[0], "a", "..",
                        [&]<class Transform, class T>() { return hand_eye_items<Transform, T>(values); });
@@ -163,8 +164,9 @@ py::object average_items(const std::array<py::object, 2>& values, bool is_robust
     return named_tuple("Averaged", py::make_tuple(transforms[0], transforms[1], parts.take()));
 }
 
-NamedTuple<"Averaged"> average_poses(const ArrayLike& any_poses, const OptionalArrayLike& any_weights,
-                                     bool is_robust) {
+Typed<"future_work.types.Averaged[typing.Any]"> average_poses(const ArrayLike& any_poses,
+                                                              const OptionalArrayLike& any_weights,
+                                                              bool is_robust) {
     const auto values = promoted<2>({"poses", "weights"}, {any_poses, any_weights});
     return with_layout(values[0], "poses", "..", [&]<class Transform, class T>() {
         return average_items<Transform, T>(values, is_robust);

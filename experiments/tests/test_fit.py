@@ -4,9 +4,9 @@
 import numpy as np
 import pytest
 import sinew
+from future_work import fit
 from motions import layout, matrix, rigid
 from scipy.spatial.transform import RigidTransform, Rotation
-from sinew import fit
 from smith_2013 import fits
 
 CASES = 2000

@@ -5,9 +5,8 @@
 #include <optional>
 #include <span>
 
+#include "future_work/ik/rotation_limits.h"
 #include "sinew/base/owned.h"
-#include "sinew/export.h"
-#include "sinew/ik/rotation_limits.h"
 #include "sinew/skeleton/skeleton.h"
 #include "sinew/transform/dual_quat.h"
 
@@ -87,7 +86,7 @@ struct IkResult {
 ///   second time, first rotated about its root towards its goal, and the better result is used: it is within
 ///   limits, and no step improves it, but a better one may exist. Bones with limits swing by at most 177.7
 ///   degrees.
-class SINEW_EXPORT IkSolver {
+class IkSolver {
 public:
     /// limits     [bones]; empty: none
     /// effectors  at least one

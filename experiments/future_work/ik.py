@@ -9,8 +9,9 @@ solver's results are float64.
 
 from typing import NamedTuple
 
-from ._native.ik import Solver, swing_twist_angles
-from ._types import Solution
+from future_work_native.ik import Solver, swing_twist_angles
+
+from .types import Solution
 
 __all__ = ["Effector", "Solution", "Solver", "swing_twist_angles"]
 

@@ -8,8 +8,8 @@
 #include <limits>
 #include <span>
 
-#include "sinew/fit/rigid.h"
-#include "sinew/fit/singular_values.h"
+#include "future_work/fit/rigid.h"
+#include "future_work/fit/singular_values.h"
 #include "sinew/interpolate/blended.h"
 #include "sinew/transform/rigid_distance.h"
 

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "sinew/fit/rigid.h"
+#include "future_work/fit/rigid.h"
 #include "sinew/interpolate/dual.h"
 #include "sinew/transform/rigid_distance.h"
 
