@@ -230,11 +230,19 @@ def package(session: nox.Session) -> None:
 
 
 def build(session: nox.Session, preset: str, *targets: str) -> None:
-    session.run("cmake", "--preset", preset, silent=True)
+    session.run("cmake", "--preset", preset, *MODULE.get(preset, ()), silent=True)
     chosen = ("--target", *targets) if targets else ()
     session.run("cmake", "--build", "--preset", preset, *chosen, silent=True)
 
 
+# What a build of a Python module takes from the environment of the wheel.
+_WHEEL, _SITE = environment_of(f"wheel-{EVERYDAY_PYTHON}"), f"lib/python{EVERYDAY_PYTHON}/site-packages"
+MODULE = {
+    "experiments": (
+        f"-DPython_EXECUTABLE={ROOT / _WHEEL}/bin/python",
+        f"-Dpybind11_ROOT={ROOT / _WHEEL / _SITE}/pybind11",
+    )
+}
 for _preset in ("bench", "experiments"):
 
     @nox.session(name=f"{_preset}-programs", python=False, requires=[f"wheel-{EVERYDAY_PYTHON}"])
@@ -304,6 +312,7 @@ job("window", "package")(
     functools.partial(pytest, name=f"bpy-{NEWEST_TESTED}", folder="tests/blender", marks="window")
 )
 job("python")(functools.partial(pytest, name=f"bpy-{EVERYDAY}", folder="tests/python"))
+job("experiments")(functools.partial(pytest, name=f"bpy-{EVERYDAY}", folder="experiments/tests"))
 job("shader")(functools.partial(pytest, name="shaders", folder="tests/shaders"))
 
 for _bpy in BLENDERS:
@@ -445,7 +454,7 @@ def test(words: list[str]) -> int:
     # The longest first.
     jobs = ["native"] * (not options and not own.blender) + ["window"] * is_whole
     jobs += [*(f"blender-{bpy}" for bpy in reversed(tested)), *["python", "shader"] * (not own.blender)]
-    jobs += ["browser"] * (is_all and not own.blender) + ["installed", "commands"] * is_whole
+    jobs += ["experiments", "browser"] * (is_all and not own.blender) + ["installed", "commands"] * is_whole
     for name in {"SINEW_RIGS", "SINEW_FULL_BLENDER"} - {*os.environ}:
         say(f"{name} is not set: tests that need it are skipped")
     shutil.rmtree(LOGS, ignore_errors=True)

@@ -29,7 +29,6 @@ COMMANDS = (
         "points",
         "reskin",
         "restore",
-        "ik",
         "inbetween",
         "blend",
         "bake",

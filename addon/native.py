@@ -20,7 +20,6 @@ NAMES = (
         "centres_of_rotation",
         "direct_delta_mush",
         "dual_quat",
-        "ik",
         "interpolate",
     ),
     *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages", "thread_id"),

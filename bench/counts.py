@@ -63,7 +63,7 @@ def main() -> None:
         print(f"No counts to compare with for this compiler; there are some for {baseline['compiler']}.\n")
     heavier = []
     for name, instructions in counts.items():
-        text = f"{name:18}{instructions:>14,}"
+        text = f"{name:27}{instructions:>14,}"
         if name in known:
             change = instructions / known[name] - 1
             text += f"{change:+9.1%}"

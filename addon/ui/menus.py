@@ -170,11 +170,10 @@ class SINEW_MT_diagnostics(_Submenu, bpy.types.Menu):
 
 class SINEW_MT_animation(_Submenu, bpy.types.Menu):
     bl_label = "Animation"
-    bl_description = "In-betweens, blends of actions and inverse kinematics"
+    bl_description = "In-betweens and blends of actions"
     entries = (
         Entry("sinew.bake_inbetweens", "Bake In-betweens\u2026"),
         Entry("sinew.blend_actions", "Blend Actions\u2026"),
-        Entry("sinew.bake_ik", "Bake Sinew IK\u2026"),
         Entry("sinew.original_action"),
     )
 

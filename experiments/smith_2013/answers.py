@@ -27,7 +27,7 @@ def answers(measurements: Measurements | None, figures: tuple[Figure, ...]) -> t
         _coordinate_changes(),
         Answer(
             "Future work: inverse kinematics, blending of motions (chapter 4), rigid bodies (chapter 5)",
-            "This page has no experiments on them.",
+            "This page has no experiments on them; future_work/ has fits and inverse kinematics.",
         ),
     )
 

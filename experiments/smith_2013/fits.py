@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""The least squares of sinew.fit.rigid by matrices and by dual quaternions, in float64 and without weights.
+"""Rigid transforms fitted to points by least squares, by each representation, in float64 and without weights.
 
 source, target: [sets, n, 3], points.
 """
@@ -20,6 +20,20 @@ def kabsch(source: np.ndarray, target: np.ndarray) -> np.ndarray:
     fits[:, :3, :3] = u @ v
     fits[:, :3, 3] = middles[1][:, 0] - np.einsum("nij,nj->ni", u @ v, middles[0][:, 0])
     return fits
+
+
+def horn(source: np.ndarray, target: np.ndarray) -> np.ndarray:
+    """[sets, 7], the rotation as an eigenvector of a 4x4 matrix (Horn 1987)."""
+    middles = [points.mean(axis=1) for points in (source, target)]
+    p, q = source - middles[0][:, None], target - middles[1][:, None]
+    s = np.einsum("npi,npj->nij", p, q)
+    skew = np.stack([s[:, i, j] - s[:, j, i] for i, j in ((1, 2), (2, 0), (0, 1))], axis=1)
+    trace = np.trace(s, axis1=1, axis2=2)
+    matrix = np.empty((len(s), 4, 4))
+    matrix[:, 0, 0], matrix[:, 0, 1:], matrix[:, 1:, 0] = trace, skew, skew
+    matrix[:, 1:, 1:] = s + np.swapaxes(s, 1, 2) - trace[:, None, None] * np.eye(3)
+    rotations = np.linalg.eigh(matrix)[1][:, :, 3]
+    return np.hstack([rotations, middles[1] - sinew.quat.rotate(rotations, middles[0])])
 
 
 def walker(source: np.ndarray, target: np.ndarray) -> np.ndarray:

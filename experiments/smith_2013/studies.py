@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import sinew
 
-from .fits import kabsch, walker
+from .fits import horn, kabsch, walker
 from .tables import LAYOUTS
 
 CHAINS = 2000
@@ -82,7 +82,7 @@ def fits(sets: int = CHAINS) -> dict[str, Spread]:
     double = [points.astype(np.float64) for points in single]
     solved = {
         "affine": kabsch(*double).astype(np.float32),
-        "quat_vec": sinew.fit.rigid(*single).transforms,
+        "quat_vec": horn(*double).astype(np.float32),
         "dual_quat": walker(*double).astype(np.float32),
     }
     found = {}

@@ -37,8 +37,4 @@ void promote(std::span<py::object> values, std::span<const char* const> argument
     }
 }
 
-py::object named_tuple(const char* name, const py::tuple& parts) {
-    return py::module_::import("sinew._types").attr(name)(*parts);
-}
-
 }  // namespace sinew::bindings

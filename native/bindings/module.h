@@ -11,8 +11,6 @@ void bind_skeleton(pybind11::module_& m);
 void bind_threads(pybind11::module_& m);
 void bind_twist_spread(pybind11::module_& m);
 void bind_transforms(pybind11::module_& m);
-void bind_fit(pybind11::module_& m);
-void bind_ik(pybind11::module_& m);
 void bind_interpolate(pybind11::module_& m);
 void bind_deformer(pybind11::module_& m);
 void bind_bulge_limit(pybind11::module_& m);

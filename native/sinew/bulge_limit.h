@@ -6,7 +6,6 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
-#include "sinew/base/strided.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
@@ -49,7 +48,7 @@ public:
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
     ///
     /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
-    [[nodiscard]] bool apply(Strided<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const BulgeLimitOptions& options = {}) const noexcept;
 
 private:

@@ -30,15 +30,6 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
     return pack_mix(mesh, weights);
 }
 
-/// Copies the points of the vertices in blocks [begin, end).
-void copy_points(const PackedMesh& mesh, std::span<const Vec3<float>> from, Strided<Vec3<float>> to,
-                 std::size_t begin, std::size_t end) {
-    for (std::size_t b = begin; b < end; ++b) {
-        for (const std::int32_t vertex : std::span(mesh.vertices[b].lane).first(mesh.blocks[b].vertices))
-            to[vertex] = from[static_cast<std::size_t>(vertex)];
-    }
-}
-
 }  // namespace
 
 struct Deformer::State {
@@ -120,13 +111,10 @@ bool Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) noexcep
 }
 
 bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                      Strided<Vec3<float>> points) const noexcept {
+                      std::span<Vec3<float>> points) const noexcept {
     const PackedBinding& packed = *state_->packed;
     if (points.size() != packed.vertex_count) return false;
     const PaletteStore::Reading reading(state_->palettes);
-    const std::span<Vec3<float>> deformed =
-        points.is_contiguous() ? std::span(points.data(), points.size()) : reading.points(points.size());
-    if (deformed.size() != points.size()) return false;
     const Bones bones{packed.mesh.used_bones,   packed.stretched_bones, posed_from_rest,  packed.rest_bones,
                       options.bones_from_model, &state_->sets,          options.rotations};
     const SpaceRows rows(options.bones_from_model);
@@ -146,7 +134,7 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
                      &palette,
                      rows.spaces(),
                      parameters[k].data(),
-                     deformed};
+                     points.data()};
     }
     parallel_for_blocks(packed.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
         if (state_->mix) {
@@ -154,7 +142,6 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
         } else {
             state_->kernels[0]->deform[target_in_use()](frames[0], begin, end);
         }
-        if (!points.is_contiguous()) copy_points(packed.mesh, deformed, points, begin, end);
     });
     return true;
 }

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
-#include "sinew/base/strided.h"
 #include "sinew/binding.h"
 
 namespace sinew {
@@ -69,12 +68,11 @@ public:
     /// Writes the deformed points, model space.
     ///
     /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
-    /// points           [vertices], in a vertex buffer, too. The first such call of a thread allocates memory for a
-    ///                  copy, and returns false if there is none
+    /// points           [vertices]
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest.
     [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                              Strided<Vec3<float>> points) const noexcept;
+                              std::span<Vec3<float>> points) const noexcept;
 
 private:
     struct State;

@@ -15,10 +15,6 @@
 #include "sinew/bulge_limit.h"
 #include "sinew/deformer.h"
 #include "sinew/delta_mush.h"
-#include "sinew/fit/average.h"
-#include "sinew/fit/hand_eye.h"
-#include "sinew/fit/rigid.h"
-#include "sinew/ik/solver.h"
 #include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/interpolate/spline.h"
@@ -34,7 +30,6 @@
 #include "sinew/transform/rigid_distance.h"
 #include "sinew/transform/screw.h"
 #include "sinew/twist_spread.h"
-#include "sinew/vertex_buffers.h"
 #if SINEW_WITH_DDM
 #include "sinew/methods/ddm/direct_delta_mush.h"
 #endif

@@ -45,14 +45,14 @@ public:
     /// Writes the deformed points, bit for bit those of a Deformer, and normals and tangents of unit length.
     ///
     /// posed_from_rest  [bones, at least deformer().bone_count()] finite; missing bones stay at rest
-    /// points           [vertices], as for Deformer::deform(), which may return false without memory
+    /// points           [vertices]
     /// normals          [frames]
     /// tangents         [frames], or empty; empty if there are none at rest
     ///
     /// A vertex without influences keeps its normals and tangents.
     [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                              Strided<Vec3<float>> points, Strided<Vec3<float>> normals,
-                              Strided<Vec3<float>> tangents = {}) const noexcept;
+                              std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
+                              std::span<Vec3<float>> tangents = {}) const noexcept;
 
     /// Writes the same normals if the points for the same pose and options are known. This saves a quarter of the
     /// time.
@@ -60,8 +60,8 @@ public:
     /// points   [vertices] as written by deform() or by the Deformer
     /// normals  [frames]
     [[nodiscard]] bool deform_normals(std::span<const Affine<float>> posed_from_rest,
-                                      const DeformOptions& options, Strided<const Vec3<float>> points,
-                                      Strided<Vec3<float>> normals) const noexcept;
+                                      const DeformOptions& options, std::span<const Vec3<float>> points,
+                                      std::span<Vec3<float>> normals) const noexcept;
 
 private:
     struct State;

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
-#include "sinew/base/strided.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
@@ -66,7 +65,7 @@ public:
     /// posed_from_rest  [bones] finite; missing bones stay at rest
     ///
     /// Where no bone is twisted, no bit changes.
-    [[nodiscard]] bool apply(Strided<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const TwistSpreadOptions& options = {}) const noexcept;
 
 private:

@@ -36,7 +36,6 @@ WRITERS = {
     "reskin": (("reskin", "FILE", "--method", "dq", "--frames", "none", "--out", OUT), "out"),
     "restore": (("restore", "RESKINNED", "--out", OUT), "out"),
     "inbetween": (("inbetween", "FILE", "--method", "sclerp", "--out", OUT), "out"),
-    "ik": (("ik", "REACHING", "--frames", "1-3", "--out", OUT), "out"),
     "export": (("export", "FILE", "--method", "cor", "--out", OUT), "arm.glb"),
     "blend": (("blend", "FILE", "--actions", "Bend", "Bend", "--out", OUT), "blended.blend"),
     **{
@@ -60,7 +59,7 @@ WRITERS = {
 
 @pytest.fixture(scope="module")
 def inputs(tmp_path_factory):
-    """An arm with an action of bones, the same after reskin, and one that reaches for a target."""
+    """An arm with an action of bones, and the same after reskin."""
     folder = tmp_path_factory.mktemp("inputs")
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     _obj, armature = scenes.make_arm()
@@ -69,14 +68,7 @@ def inputs(tmp_path_factory):
     run_sinew(
         "reskin", folder / "arm.blend", "--method", "dq", "--frames", "none", "--out", folder / "skinned"
     )
-    target = scenes.added("Target", None)
-    armature.pose.bones[-1].constraints.new("IK").target = target
-    scenes.save(folder / "reaching.blend")
-    return {
-        "FILE": folder / "arm.blend",
-        "RESKINNED": folder / "skinned" / "arm.blend",
-        "REACHING": folder / "reaching.blend",
-    }
+    return {"FILE": folder / "arm.blend", "RESKINNED": folder / "skinned" / "arm.blend"}
 
 
 def arguments_of(writer: str, inputs: dict, out: Path) -> list[str]:

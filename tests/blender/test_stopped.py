@@ -12,19 +12,16 @@ import pytest
 import scenes
 import test_auto_mix
 import test_blend
-import test_ik
 import test_inbetween
 import test_recommended
 import test_worst_frames
 from sinew_addon.features.auto_mix import auto_mix
 from sinew_addon.features.bake import bake
 from sinew_addon.features.blend import blend_actions
-from sinew_addon.features.ik import ik_bake
 from sinew_addon.features.inbetween import inbetween_bake
 from sinew_addon.features.measure import worst_frames
 from sinew_addon.features.suggest import recommend, suggest
-from sinew_addon.io import actions, ik_io
-from sinew_addon.ui import stepped
+from sinew_addon.io import actions
 from whole_file import assert_same, content
 
 pytestmark = pytest.mark.long_term
@@ -36,21 +33,6 @@ def inbetweens(_folder: Path) -> Steps:
     armature = test_inbetween.make_rig()
     test_inbetween.key_random_poses(armature)
     return inbetween_bake.steps(armature, "sclerp")
-
-
-def inverse_kinematics(_folder: Path) -> Steps:
-    arm = test_ik.make_arm(3)
-    arm.pose.bones["arm.0"].rotation_quaternion = (0.9, 0.1, 0.0, 0.2)
-    arm.pose.bones["base"].keyframe_insert("location", frame=1)
-    target = test_ik.make_empty("Target", test_ik.near())
-    test_ik.constrain(arm, "arm.2", target, chain_count=3)
-    bpy.context.view_layer.update()
-
-    def steps() -> Steps:
-        with stepped.kept_frame(bpy.context.scene, [arm]):
-            yield from ik_bake.steps(arm, ik_io.read_trees(arm), list(test_ik.FRAMES))
-
-    return steps()
 
 
 def blend(_folder: Path) -> Steps:
@@ -88,7 +70,7 @@ def bake_to(kind: str, folder: Path) -> Steps:
 
 
 MEASURING = (recommendation, suggestion, search_of_worst_frames)
-OTHERS = (inbetweens, inverse_kinematics, blend, mix)
+OTHERS = (inbetweens, blend, mix)
 
 
 @pytest.mark.parametrize(

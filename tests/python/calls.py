@@ -7,7 +7,7 @@ import inspect
 import numpy as np
 import sinew
 from rigs import LINEAR, about
-from sinew import ik, interpolate, spline
+from sinew import interpolate, spline
 
 
 def bones(count=2):
@@ -37,19 +37,10 @@ FACES = {
 }
 KEYS = sinew.dual_quat.from_screw_about([1, 2, 3], [0, 0, 1], np.arange(5) / 4, np.arange(5) / 2)
 SPLINE = {"keys": KEYS, "times": np.arange(5.0), "at": 0.5}
-CHAIN = {"rest": [[1, 0, 0, 0, 0, 0, 0]], "tips": [[0, 1, 0]], "goals": [[1, 0, 0, 0, 0, 1, 0]]}
 
 
 def skinned(binding, method="dq"):
     return sinew.Deformer(binding, method).deform(np.tile(POSED[1], (binding.bone_count, 1, 1)))
-
-
-def solver(**more):
-    return ik.Solver(**{"parents": [-1], "effectors": [ik.Effector(0)]} | more)
-
-
-def solve(**given):
-    return solver(effectors=[ik.Effector(0, has_pole="poles" in given)]).solve(**given)
 
 
 def on_skeleton(method):
@@ -150,12 +141,6 @@ CALLS = {
     "hermite": (spline.hermite, {"tangents": KEYS[:, 1:4], **SPLINE, "keys": KEYS[:, :3]}),
     "between": (interpolate.between, {"a": KEYS, "b": KEYS[::-1], "t": 0.5}),
     "blend": (interpolate.blend, {"transforms": KEYS, "weights": np.ones(5)}),
-    "Effector": (lambda **given: solver(effectors=[ik.Effector(**given)]), {"bone": 0}),
-    "Solver": (solver, {}),
-    "solve": (solve, CHAIN),
-    "rigid": (sinew.fit.rigid, {"source": POINTS, "target": POINTS}),
-    "hand_eye": (sinew.fit.hand_eye, {"a": KEYS, "b": KEYS}),
-    "average": (sinew.fit.average, {"poses": KEYS}),
 }
 OPTIONS = {"out": np.zeros((2, 3), np.float32), "threads": 2, "bones_from_model": POSED[1]}
 OF_POSE = {
@@ -203,18 +188,6 @@ MORE = {
     "catmull_rom": {"method": "sclerp"},
     "between": {"method": "dlb"},
     "blend": {"method": "sclerp", "signs": "as_given"},
-    "Effector": {"position_weight": 1.0, "rotation_weight": 0.5, "has_pole": True, "pole_angle": 0.2},
-    "Solver": {"locked": [[0, 1, 0]], "limits": [[[-1, 1]] * 3], "stiffness": [[0.5, 0, 0]]},
-    "solve": {
-        **{"poles": [[0, 0, 1]], "rotations": [[1, 0, 0, 0]], "root": CHAIN["goals"][0]},
-        **{"tolerance": 1e-6, "iterations": 5},
-    },
-    "rigid": {
-        **{"weights": HALF, "source_directions": POINTS, "target_directions": POINTS},
-        "direction_weights": HALF,
-    },
-    "hand_eye": {"weights": np.ones(5)},
-    "average": {"weights": np.ones(5), "robust": True},
 }
 
 LAYOUTS = {"affine": POSED[1], "quat_vec": sinew.dual_quat.to_quat_vec(KEYS[1]), "dual_quat": KEYS[1]}

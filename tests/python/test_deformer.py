@@ -375,7 +375,6 @@ CALLS = {
     "SkinnedNormals": "lambda: skinned.deform(bones, threads=3)[1]",
     "BulgeLimit": "lambda: (limit.set_rest_points(rest), limit.apply(rest, bones, threads=3))[1]",
     "TwistSpread": "lambda: (spread.set_rest_points(rest), spread.apply(rest, bones, threads=3))[1]",
-    "IkSolver": "lambda: solver.solve(chains, [[0, 1, 0]], [GOAL], iterations=3).rotations",
 }
 
 
@@ -410,9 +409,6 @@ normals = sinew.Normals(count, *faces)
 skinned = sinew.SkinnedNormals(sinew.Binding(*skin), np.tile(np.float32([0, 0, 1]), (count, 1)))
 limit = sinew.BulgeLimit(sinew.Binding(*skin), [[0, 0, 0]], [[0, 1, 0]])
 spread = sinew.TwistSpread(sinew.Binding(*skin), [[0, 0, 0, 1]], [[0, 0, 0]], [[0, 1, 0]], bones)
-solver = sinew.ik.Solver([-1, *range(59)], [sinew.ik.Effector(59)])
-chains = np.tile([1.0, 0, 0, 0, 0, 0, 0.5, 0], (500, 60, 1))
-GOAL = [1, 0, 0, 0, 0, 3, 4, 0]
 call = CALL
 expected = call()
 done = threading.Event()

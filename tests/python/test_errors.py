@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 import sinew
-from calls import BINDING, CALLS, CHAIN, ENDS, FACES, HALF, KEYS, MORE, POINTS, SHEET, bones
-from sinew import ik, interpolate
+from calls import BINDING, CALLS, ENDS, FACES, HALF, KEYS, MORE, POINTS, SHEET, bones
+from sinew import interpolate
 
 NAN, INF = np.float32("nan"), np.float32("inf")
 MOMENTS = [0, 0, 1, *[0] * 9]
@@ -229,27 +229,6 @@ ROWS = [
     ("dual.divide", "b", [0, 1], None, None),
     ("dual.sqrt", "a", [0, 1], None, None),
     ("dual.log", "a", [-1, 1], None, None),
-    ("Solver", "effectors", [], None, None),
-    ("Solver", "effectors", [ik.Effector(1)], None, None),
-    ("Solver", "effectors", [ik.Effector(0, has_pole=np.zeros(2))], None, None),
-    ("Solver", "effectors", np.array({}, dtype=object), None, None),
-    ("Solver", "parents", [0], None, None),
-    ("Solver", "limits", np.zeros((2, 3)), None, None),
-    ("Solver", "limits", np.full((1, 3, 2), np.nan), None, None),
-    ("Solver", "stiffness", [[1, 0, 0]], None, None),
-    ("solve", "rest", np.tile(CHAIN["rest"], (2, 1)), None, None),
-    ("solve", "goals", CHAIN["goals"][0], None, None),
-    ("solve", "tips", [[0, np.inf, 0]], None, None),
-    ("solve", "iterations", -1, None, None),
-    ("solve", "poles", None, None, None),
-    ("rigid", "target", SHEET, None, None),
-    ("rigid", "source", POINTS * NAN, None, None),
-    ("rigid", "weights", np.ones(3), None, None),
-    ("rigid", "weights", -np.ones(2), None, None),
-    ("hand_eye", "b", KEYS[:3], None, None),
-    ("hand_eye", "a", KEYS[:, :3], None, None),
-    ("average", "poses", KEYS[:0], None, None),
-    ("average", "weights", np.ones(3), None, None),
 ]
 if "ddm" in {method.name for method in sinew.methods()}:
     ROWS += [("moments", "radius", radius, "a number of 0 or more", "") for radius in (-1.0, np.nan, np.inf)]

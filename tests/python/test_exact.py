@@ -10,19 +10,18 @@ quaternions, and translations of 0, 1e-25 and 1e12.
 
 import inspect
 
-import exact_fits
 import exact_interpolation
 import exact_transforms
 import pytest
 import sinew
 
-MODULES = ("affine", "quat_vec", "dual_quat", "quat", "dual", "interpolate", "spline", "fit")
+MODULES = ("affine", "quat_vec", "dual_quat", "quat", "dual", "interpolate", "spline")
 METHODS = {
     "interpolate.between": sinew.interpolate.METHODS,
     "interpolate.blend": sinew.interpolate.METHODS,
     "spline.catmull_rom": sinew.interpolate.METHODS,
 }
-CHECKS = {**exact_transforms.CHECKS, **exact_interpolation.CHECKS, **exact_fits.CHECKS}
+CHECKS = {**exact_transforms.CHECKS, **exact_interpolation.CHECKS}
 
 
 def public_functions():

@@ -200,7 +200,7 @@ def attempt(name, given):
 
 
 # What errors name beside arguments of the call: of several together, and of what a call also makes.
-OTHERS = "segments", "effectors", "weights", "method", "self"
+OTHERS = "segments", "weights", "method", "self"
 
 
 def form_of(rng, name, array):

@@ -290,7 +290,7 @@ def public_headers() -> list[str]:
     listed = re.search(r"set\(headers\s+([^)]*)\)", described)
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
-    folders = ("transform", "interpolate", "fit", "skeleton", "ik")
+    folders = ("transform", "interpolate", "skeleton")
     others = [path.relative_to(HEADERS).as_posix() for f in folders for path in (HEADERS / f).glob("*.h")]
     return [name for name in listed[1].split() if name != "sinew.h"] + sorted(others)
 

@@ -33,6 +33,8 @@ OUTSIDE = {
     "NOTICES.md": "notices.html",
     "bench/README.md": "measurements.html",
     "experiments/README.md": "experiments.html",
+    "experiments/future_work/fits.md": "fits.html",
+    "experiments/future_work/ik.md": "ik.html",
     "tests/golden/README.md": "golden.html",
 }
 

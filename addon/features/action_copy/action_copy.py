@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Has an armature play a copy of its action, which plays without Sinew; and restores the original, the pose
-that it did not key, and the constraints that the copy stands for."""
+"""Has an armature play a copy of its action, which plays without Sinew; and restores the original, and the
+pose that it did not key."""
 
 import json
 from collections.abc import Iterator
@@ -9,7 +9,7 @@ from contextlib import contextmanager
 import bpy
 
 from ...base.errors import SinewError
-from ...io import actions, ik_io, pose_io
+from ...io import actions, pose_io
 
 
 class SinewActionCopy(bpy.types.PropertyGroup):
@@ -18,8 +18,7 @@ class SinewActionCopy(bpy.types.PropertyGroup):
 
     is_on: bpy.props.BoolProperty(description="Whether it is a copy with keys of Sinew")
     original: bpy.props.PointerProperty(type=bpy.types.Action, description="The action before")
-    # JSON: a list of [bone, constraint]; and channels by bone, as from pose_io.read_channels().
-    muted: bpy.props.StringProperty(description="The IK constraints that are muted meanwhile")
+    # JSON: channels by bone, as from pose_io.read_channels().
     channels: bpy.props.StringProperty(description="The pose before")
 
 
@@ -51,33 +50,30 @@ def check(armature: bpy.types.Object) -> None:
 
 
 @contextmanager
-def playing(armature: bpy.types.Object, suffix: str) -> Iterator[list[tuple[str, str]]]:
+def playing(armature: bpy.types.Object, suffix: str) -> Iterator[None]:
     """Context in which the armature plays a copy of its action, to be keyed; without an action, the first key
-    makes one. What is added to the list, [bone, constraint], stays muted until restore(). After an error, and
-    where the context is left before its end, everything is as before.
+    makes one. After an error, and where the context is left before its end, everything is as before.
     """
     check(armature)
     was_on = is_on(armature)
     action, slot = actions.playing(armature)
     handle = actions.handle_of(slot)
     channels = pose_io.read_channels(armature.pose.bones)
-    muted: list[tuple[str, str]] = []
     try:
         if action is not None:
             copy = action.copy()
             copy.name = f"{action.name} {suffix}"
             _play(armature, copy, handle)
-        yield muted
+        yield
     except BaseException:
-        ik_io.set_muted(armature, muted, False)
         made = actions.playing(armature)[0]
         _play(armature, action, handle)
         if made is not None and made != action:
             bpy.data.actions.remove(made)
         pose_io.write_channels(armature.pose.bones, channels)
         raise
-    record = actions.playing(armature)[0].sinew_copy
     if not was_on:
+        record = actions.playing(armature)[0].sinew_copy
         record.is_on, record.original = True, action
         record.channels = json.dumps(
             {bone.name: row for bone, row in zip(armature.pose.bones, channels.tolist(), strict=True)}
@@ -86,21 +82,19 @@ def playing(armature: bpy.types.Object, suffix: str) -> Iterator[list[tuple[str,
             action.use_fake_user = True
     elif not action.users:
         bpy.data.actions.remove(action)
-    record.muted = json.dumps([*json.loads(record.muted or "[]"), *muted])
 
 
 def restore(armature: bpy.types.Object) -> None:
-    """Restores what playing() replaced: the action, the poses that it did not key, the constraints."""
+    """Restores what playing() replaced: the action, and the poses that it did not key."""
     copy, slot = actions.playing(armature)
     record = copy.sinew_copy
-    muted, saved = json.loads(record.muted or "[]"), json.loads(record.channels)
+    saved = json.loads(record.channels)
     _play(armature, record.original, actions.handle_of(slot))
     channels = pose_io.read_channels(armature.pose.bones)
     for row, bone in enumerate(armature.pose.bones):
         if bone.name in saved:
             channels[row] = saved[bone.name]
     pose_io.write_channels(armature.pose.bones, channels)
-    ik_io.set_muted(armature, [tuple(pair) for pair in muted], False)
     if not copy.users:
         bpy.data.actions.remove(copy)
 

@@ -28,9 +28,7 @@ def selected_bones(armature: bpy.types.Object) -> list[str] | None:
 
 class SINEW_OT_original_action(operators.Acting, bpy.types.Operator):
     bl_label = "Original Action"
-    bl_description = (
-        "Play the action that was there before Sinew keyed a copy, with its IK constraints; the copy goes"
-    )
+    bl_description = "Play the action that was there before Sinew keyed a copy; the copy goes"
 
     @classmethod
     def refusal(cls, context: bpy.types.Context) -> str:

@@ -2,8 +2,7 @@
 """Skinning in native code: bind a mesh to bones once, then deform it for any pose. Numpy in, numpy out.
 
 sinew.affine, sinew.quat_vec and sinew.dual_quat have rigid transforms; sinew.quat and sinew.dual have their
-parts; sinew.interpolate and sinew.spline interpolate them; sinew.fit fits them to measurements; sinew.ik has
-inverse kinematics.
+parts; sinew.interpolate and sinew.spline interpolate them.
 
 An array is described by its type and, in brackets, the length of each axis: float32 [vertices, 3]. An
 argument may be anything that numpy converts to such an array without losing more than digits of fractions:
@@ -21,7 +20,7 @@ Errors say which argument is wrong, what was expected and what was given: ValueE
 that is no str.
 """
 
-from . import affine, dual, dual_quat, fit, ik, interpolate, quat, quat_vec, spline
+from . import affine, dual, dual_quat, interpolate, quat, quat_vec, spline
 from ._native import (
     Binding,
     BulgeLimit,
@@ -65,8 +64,6 @@ __all__ = [
     "direct_delta_mush",
     "dual",
     "dual_quat",
-    "fit",
-    "ik",
     "interpolate",
     "keep_thread_state",
     "methods",

@@ -22,7 +22,7 @@ sclerp and dib are the same method, named after its interpolation of two and its
 In a blend of many, the order matters if several transforms are the heaviest and far apart, since signs
 follow the first of them. Of 2,000 random blends of three transforms with equal weights, up to 143 degrees
 from the identity, 13 % change with the order (qv_nlerp, qv_slerp, dlb, dib); different weights leave a
-single heaviest. Such a blend is not defined. `sinew.fit.average` does not depend on the order.
+single heaviest. Such a blend is not defined.
 
 Each result says whether it is defined. It is not defined in these cases, and is then:
   several heaviest transforms, and another order would give another blend: the one of the first;

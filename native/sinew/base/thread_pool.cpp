@@ -272,34 +272,6 @@ std::size_t Pool::start_workers(std::size_t wanted) noexcept {
     return std::min(worker_count_, wanted);
 }
 
-constinit JobSystem job_system;
-
-/// parallel_for() by the host's job system: `jobs` jobs take chunks until none is left.
-void run_by_host(std::size_t count, std::size_t jobs, const Work& work, std::size_t chunk) {
-    struct Shared {
-        const Work& work;
-        std::size_t count, chunk;
-        std::atomic<std::size_t> next{0};
-        std::atomic<bool> failed{false};
-        std::exception_ptr error{};
-    } shared{work, count, chunk};
-    const auto job = [](void* of_job, std::size_t) {
-        Shared& own = *static_cast<Shared*>(of_job);
-        // Exceptions do not pass through the host.
-        try {
-            while (!own.failed.load(std::memory_order_relaxed)) {
-                const std::size_t begin = own.next.fetch_add(own.chunk, std::memory_order_relaxed);
-                if (begin >= own.count) return;
-                own.work(begin, std::min(begin + own.chunk, own.count));
-            }
-        } catch (...) {
-            if (!own.failed.exchange(true)) own.error = std::current_exception();
-        }
-    };
-    job_system.run(job_system.host, jobs, job, &shared);
-    if (shared.error) std::rethrow_exception(shared.error);
-}
-
 std::atomic<std::uint32_t> fork_count{0};
 
 #ifndef _WIN32
@@ -314,10 +286,7 @@ std::atomic<std::uint32_t> fork_count{0};
 
 std::uint32_t forks() noexcept { return fork_count.load(std::memory_order_relaxed); }
 
-void use_job_system(const JobSystem& system) noexcept { job_system = system; }
-
 std::size_t hardware_threads() noexcept {
-    if (job_system.run != nullptr) return std::clamp<std::size_t>(job_system.threads, 1, kMaxThreads);
     // Querying the system takes 10 us, as long as deforming 5,000 vertices.
     static const std::size_t threads =
         std::clamp<std::size_t>(std::thread::hardware_concurrency(), 1, kMaxThreads);
@@ -331,7 +300,6 @@ void run_chunks(std::size_t count, std::size_t threads, const Work& work, std::s
     const std::size_t useful =
         std::min({useful_threads(threads, count - 1, chunk), (count - 1) / chunk + 1, kMaxThreads});
     if (useful <= 1) return run_alone(count, work, chunk);
-    if (job_system.run != nullptr) return run_by_host(count, useful, work, chunk);
     pool.run(count, useful, work, chunk);
 }
 

@@ -9,7 +9,7 @@
 
 namespace sinew {
 
-/// The number of threads that this machine, or the host's job system, runs at once; at least 1.
+/// The number of threads that this machine runs at once; at least 1.
 [[nodiscard]] SINEW_EXPORT std::size_t hardware_threads() noexcept;
 
 /// `threads` as every function of the library takes it: at most this many; 0: as many as useful, which is one for
@@ -37,23 +37,6 @@ void parallel_for(std::size_t count, std::size_t threads, const Work& work, std:
     // Of a reference, so that it does not allocate.
     run_chunks(count, threads, std::cref(work), chunk);
 }
-
-/// A host's own job system, in the place of Sinew's threads.
-struct JobSystem {
-    /// Calls job(of_job, i) once for each i below `jobs`, on any threads, the caller's among them, and returns when
-    /// all have returned. They throw nothing.
-    using Run = void (*)(void* host, std::size_t jobs, void (*job)(void* of_job, std::size_t i),
-                         void* of_job);
-
-    Run run = nullptr;
-    void* host = nullptr;     // passed to `run`
-    std::size_t threads = 1;  // how many jobs it runs at once: what hardware_threads() returns then
-};
-
-/// Has parallel_for() use a host's job system, which several threads may call at once; without JobSystem::run,
-/// Sinew's own threads again. Not while the library is called. What runs in the background (BackgroundJob) keeps its
-/// own thread.
-SINEW_EXPORT void use_job_system(const JobSystem& system) noexcept;
 
 /// Whether parallel_for() was called in the last tenth of a second, as it is while an animation plays.
 [[nodiscard]] SINEW_EXPORT bool is_in_use() noexcept;

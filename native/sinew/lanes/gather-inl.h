@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Gathers points of arbitrary vertices into lanes; reads and writes deformed ones, which other data may lie between.
-// Compiled once for each instruction set.
+// Gathers points of arbitrary vertices into lanes. Compiled once for each instruction set.
 #if defined(SINEW_LANES_GATHER_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef SINEW_LANES_GATHER_INL_H_
 #undef SINEW_LANES_GATHER_INL_H_
@@ -79,56 +78,12 @@ HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* ver
     return load_consecutive(d, reinterpret_cast<const float*>(points + *vertices));
 }
 
-/// Stores each point by itself.
-///
-/// to_point  returns where that of a lane is
-///
-/// Not inlined into loops, whose stack frame would grow for every block.
-template <class D, class ToPoint>
-HWY_NOINLINE void store_apart(D d, Vec<D> x, Vec<D> y, Vec<D> z, const ToPoint& to_point) {
-    alignas(64) float rows[3][hn::MaxLanes(D())];
-    hn::Store(x, d, rows[0]);
-    hn::Store(y, d, rows[1]);
-    hn::Store(z, d, rows[2]);
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) to_point(i) = {rows[0][i], rows[1][i], rows[2][i]};
-}
-
-/// The inverse of store_apart().
-template <class D, class ToPoint>
-HWY_NOINLINE Points<D> load_apart(D d, const ToPoint& to_point) {
-    alignas(64) float rows[3][hn::MaxLanes(D())];
-    for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-        const Vec3<float>& point = to_point(i);
-        rows[0][i] = point.x, rows[1][i] = point.y, rows[2][i] = point.z;
-    }
-    return {hn::Load(d, rows[0]), hn::Load(d, rows[1]), hn::Load(d, rows[2])};
-}
-
-/// Elements from `i` on.
-template <class D>
-HWY_INLINE Points<D> load_at(D d, const Strided<const Vec3<float>>& from, std::size_t i) {
-    if (from.is_contiguous()) return load_consecutive(d, &from[i].x);
-    return load_apart(
-        d, [ from, i ](std::size_t k) -> auto& { return from[i + k]; });
-}
-
-template <class D>
-HWY_INLINE void store_at(D d, const Points<D>& p, const Strided<Vec3<float>>& to, std::size_t i) {
-    if (to.is_contiguous()) return store_consecutive(d, p, &to[i].x);
-    store_apart(
-        d, p.x, p.y, p.z, [ to, i ](std::size_t k) -> auto& { return to[i + k]; });
-}
-
 /// The deformed points of block `b`.
 template <class D>
 HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b, std::size_t lane) {
     const Block& block = from.blocks[b];
     const std::int32_t* const vertices = from.vertices[b].lane.data() + lane;
-    if (HWY_UNLIKELY(!from.points.is_contiguous())) {
-        return load_apart(
-            d, [ vertices, points = from.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
-    }
-    const Vec3<float>* const points = from.points.data();
+    const Vec3<float>* const points = from.points;
     if constexpr (hn::MaxLanes(D()) > 1) {
         if (block.consecutive) return load_consecutive(d, &points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3
@@ -136,17 +91,6 @@ HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b,
 #endif
     }
     return points_of<true>(d, points, vertices);
-}
-
-/// The inverse of load_deformed().
-template <class D>
-HWY_INLINE void store_deformed(D d, const MeshPointers& to, std::size_t b, std::size_t lane,
-                               const Points<D>& p) {
-    if (to.points.is_contiguous()) return store_points(d, to, b, lane, p);
-    const std::int32_t* const vertices = to.vertices[b].lane.data() + lane;
-    store_apart(
-        d, p.x, p.y, p.z,
-        [ vertices, points = to.points ](std::size_t i) -> auto& { return points[vertices[i]]; });
 }
 
 }  // namespace HWY_NAMESPACE

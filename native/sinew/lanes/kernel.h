@@ -47,7 +47,7 @@ struct Frame {
     const Palette* palette;
     Spaces spaces;
     const double* parameters;  // [MethodInfo::parameters] valid_value() of each
-    std::span<Vec3<float>> points;
+    Vec3<float>* points;
 };
 
 /// How the library deforms whole meshes with one method: five functions. Registered in methods/NAME/NAME.cpp by

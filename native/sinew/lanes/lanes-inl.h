@@ -12,7 +12,6 @@
 #include <cstring>
 
 #include "hwy/highway.h"
-#include "sinew/base/strided.h"
 #include "sinew/lanes/kernel.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -39,7 +38,7 @@ struct MeshPointers {
     const Lanes<float>* vertex_rows;  // PackedVertexData::rows; null if there is no vertex data
     const Lanes<std::int32_t>* vertices;
     const Run* runs;
-    Strided<Vec3<float>> points;
+    Vec3<float>* points;
 };
 
 HWY_INLINE MeshPointers pointers_of(const Frame& frame) {
@@ -352,8 +351,7 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
 
 #endif
 
-/// Writes lanes [lane, lane + N) of block `b`, to points with nothing between them. Lanes that repeat the last vertex
-/// write it again.
+/// Writes lanes [lane, lane + N) of block `b`. Lanes that repeat the last vertex write it again.
 template <class D>
 HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::size_t lane,
                              const Points<D>& p) {
@@ -362,7 +360,7 @@ HWY_INLINE void store_points(D d, const MeshPointers& to, std::size_t b, std::si
     if constexpr (hn::MaxLanes(D()) == 1) {
         store_consecutive(d, p, &to.points[*vertices].x);
     } else {
-        Vec3<float>* const points = to.points.data();
+        Vec3<float>* const points = to.points;
         if (block.consecutive) return store_consecutive(d, p, &points[block.output + lane].x);
 #if HWY_TARGET == HWY_AVX3
         if (block.runs > 0) return store_runs(d, to.runs + block.output, block.runs, p, &points->x);

@@ -51,7 +51,6 @@ struct PaletteStore::Palettes {
 
     std::array<Palette, kMaxKernels> of_kernels{};
     std::array<std::unique_ptr<std::byte[]>, kMaxKernels> memory;
-    std::unique_ptr<Vec3<float>[]> points;
 };
 
 PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries)
@@ -91,12 +90,6 @@ PaletteStore::Reading::Reading(PaletteStore& store) noexcept : store_(store) {
 
 Palette& PaletteStore::Reading::palette(std::size_t kernel) const noexcept {
     return store_.palettes_[index_].load(std::memory_order_relaxed)->of_kernels[kernel];
-}
-
-std::span<Vec3<float>> PaletteStore::Reading::points(std::size_t count) const noexcept {
-    std::unique_ptr<Vec3<float>[]>& points = store_.palettes_[index_].load(std::memory_order_relaxed)->points;
-    if (points == nullptr) points.reset(new (std::nothrow) Vec3<float>[count]);
-    return {points.get(), points != nullptr ? count : 0};
 }
 
 PaletteStore::Writing::Writing(PaletteStore& store) noexcept : store_(store) {

@@ -12,7 +12,7 @@
 
 namespace sinew {
 
-/// What each thread that deforms a mesh writes: palettes, and points. Also a readers-writer lock for the mesh: many
+/// The palettes that each thread that deforms a mesh writes. Also a readers-writer lock for the mesh: many
 /// threads may deform, or one may change the rest points.
 ///
 /// The first thread's palettes are allocated with the mesh, those of another when more threads than ever before
@@ -41,8 +41,6 @@ public:
 
         /// The palette for the kernel with this index.
         [[nodiscard]] Palette& palette(std::size_t kernel) const noexcept;
-        /// Memory for the points [count] of the mesh; allocated by the first call. Empty without memory.
-        [[nodiscard]] std::span<Vec3<float>> points(std::size_t count) const noexcept;
 
     private:
         PaletteStore& store_;

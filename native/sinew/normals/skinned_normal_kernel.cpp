@@ -38,7 +38,7 @@ struct Cofactors {
 
 template <class D>
 HWY_INLINE Cofactors<D> cofactors_of(D d, const SkinnedNormalFrame& frame, std::size_t i) {
-    const Points<D> points = load_at(d, frame.points, i);
+    const Points<D> points = load_consecutive(d, &frame.points[i].x);
     const Points<D> x = column(d, frame, 0, points, i);
     const Points<D> y = column(d, frame, 1, points, i);
     const Points<D> z = column(d, frame, 2, points, i);
@@ -73,7 +73,7 @@ void of_vertices(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end
     const SkinnedNormalFrame frame = f;
     in_lanes(begin, end, [&frame](auto d, std::size_t i) HWY_ATTR {
         const auto rest = load_consecutive(d, &frame.rest_normals[i].x);
-        store_at(d, moved_normals(d, cofactors_of(d, frame, i), rest), frame.normals, i);
+        store_consecutive(d, moved_normals(d, cofactors_of(d, frame, i), rest), &frame.normals[i].x);
     });
 }
 
@@ -97,7 +97,7 @@ void of_frames(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end) 
         };
         const Cofactors<decltype(d)> of{{cofactor(0), cofactor(1), cofactor(2)}};
         const auto rest = load_consecutive(d, &frame.rest_normals[i].x);
-        store_at(d, moved_normals(d, of, rest), frame.normals, i);
+        store_consecutive(d, moved_normals(d, of, rest), &frame.normals[i].x);
     });
 }
 

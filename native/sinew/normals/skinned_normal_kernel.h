@@ -5,7 +5,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "sinew/base/strided.h"
 #include "sinew/base/targets.h"
 #include "sinew/lanes/palette.h"
 
@@ -13,14 +12,14 @@ namespace sinew {
 
 /// The input and output of one frame.
 struct SkinnedNormalFrame {
-    Strided<const Vec3<float>> points;  // [vertices] deformed
+    const Vec3<float>* points;  // [vertices] deformed
     // [vertices] deformed, from rest points one step away along each axis
     std::array<const Vec3<float>*, 3> moved;
     float inverse_step;                // 1 over that step, which is the same for all three axes
     std::array<Float4*, 3> cofactors;  // [vertices] of each vertex's blend, for each axis
     const Vec3<float>* rest_normals;   // [normals]
     const std::int32_t* vertices;      // [normals] the vertex of each
-    Strided<Vec3<float>> normals;      // [normals]
+    Vec3<float>* normals;              // [normals]
 };
 
 /// Functions for elements [begin, end), compiled once for each instruction set. Results do not depend on how the

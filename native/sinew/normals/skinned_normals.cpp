@@ -92,15 +92,13 @@ struct SkinnedNormals::State {
         return are_moved;
     }
 
-    void move_normals(Strided<const Vec3<float>> points, Strided<Vec3<float>> to,
+    void move_normals(std::span<const Vec3<float>> points, std::span<Vec3<float>> to,
                       std::size_t threads) const noexcept {
-        const SkinnedNormalFrame frame{points,
-                                       {moved[0].data(), moved[1].data(), moved[2].data()},
-                                       inverse_step,
-                                       {cofactors[0].data(), cofactors[1].data(), cofactors[2].data()},
-                                       normals.data(),
-                                       vertices.data(),
-                                       to};
+        const SkinnedNormalFrame frame{
+            points.data(),  {moved[0].data(), moved[1].data(), moved[2].data()},
+            inverse_step,   {cofactors[0].data(), cofactors[1].data(), cofactors[2].data()},
+            normals.data(), vertices.data(),
+            to.data()};
         const auto compute = [&](const SkinnedNormalKernel::OfRange& function, std::size_t count) {
             const auto part = [&](std::size_t begin, std::size_t end) {
                 function[target_in_use()](frame, begin, end);
@@ -113,7 +111,7 @@ struct SkinnedNormals::State {
     }
 
     /// Moves the tangents of frames [begin, end).
-    void move_tangents(Strided<const Vec3<float>> points, Strided<Vec3<float>> to, std::size_t begin,
+    void move_tangents(std::span<const Vec3<float>> points, std::span<Vec3<float>> to, std::size_t begin,
                        std::size_t end) const noexcept {
         for (std::size_t i = begin; i < end; ++i) {
             const std::size_t vertex = vertices.empty() ? i : static_cast<std::size_t>(vertices[i]);
@@ -147,8 +145,8 @@ bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.em
 const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformers[0]; }
 
 bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                            Strided<Vec3<float>> points, Strided<Vec3<float>> normals,
-                            Strided<Vec3<float>> tangents) const noexcept {
+                            std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
+                            std::span<Vec3<float>> tangents) const noexcept {
     const State& state = *state_;
     const std::size_t most_tangents = state.tangents.size();
     if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
@@ -167,8 +165,8 @@ bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, cons
 }
 
 bool SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
-                                    const DeformOptions& options, Strided<const Vec3<float>> points,
-                                    Strided<Vec3<float>> normals) const noexcept {
+                                    const DeformOptions& options, std::span<const Vec3<float>> points,
+                                    std::span<Vec3<float>> normals) const noexcept {
     const State& state = *state_;
     if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
     const std::scoped_lock lock(state.mutex);

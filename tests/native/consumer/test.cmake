@@ -1,7 +1,6 @@
 # Installs the library, builds the programs of this folder against it and runs them.
 #   cmake -DSOURCE=... -DBUILD=... [-DGLM=...] -P test.cmake
 # GLM  a folder with GLM's headers: installs as on a system without GLM, with these headers instead of fetched ones
-# GLES whether there is OpenGL ES: also builds native/example
 set(folder "${BUILD}/consumer")
 set(build "${BUILD}")
 set(without_glm "")
@@ -56,11 +55,3 @@ run(${CMAKE_COMMAND} --build "${folder}/build")
 foreach(program library calls_plain calls_aligned)
   run("${folder}/build/${program}")
 endforeach()
-
-# The engine of docs/engines.md.
-if(GLES)
-  run(${CMAKE_COMMAND} -S "${SOURCE}/native/example" -B "${folder}/example" -G Ninja
-    "-DCMAKE_PREFIX_PATH=${folder}/installed" "-DCMAKE_CXX_FLAGS=${FLAGS}")
-  run(${CMAKE_COMMAND} --build "${folder}/example")
-  run("${folder}/example/engine" "${folder}/engine.ppm")
-endif()

@@ -10,11 +10,9 @@ from . import quat_vec
 from . import dual_quat
 from . import dual
 from . import quat
-from . import fit
-from . import ik
 from . import interpolate
 from . import spline
-__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'fit', 'ik', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
+__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
 class Parameter:
     """A setting of a method or of a stage."""
     def __repr__(self) -> str: ...

@@ -241,7 +241,7 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const float* const weights = frame.mesh->weights[block.first_weight].lane.data();
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
-        Vec3<float>* const to = frame.points.data() + frame.mesh->vertices[b].lane[lane];
+        Vec3<float>* const to = frame.points + frame.mesh->vertices[b].lane[lane];
         if (is_added_plainly(*frame.palette, bones, block.influences)) {
             deform_plain_vertex(frame, bones, block.influences, rest + lane, weights + lane, to);
         } else {

@@ -101,7 +101,7 @@ void limit_set(const BulgeFrame& frame, const MeshPointers& pointers, std::size_
                     return hn::Load(d, (k == 0 ? first_weights : weights + kLanes * (k - 1)) + lane);
                 },
                 load_deformed(d, pointers, b, lane), changes);
-            if (changes) store_deformed(d, pointers, b, lane, points);
+            if (changes) store_points(d, pointers, b, lane, points);
         }
     }
 }
@@ -125,7 +125,7 @@ void limit_own_bones(const BulgeFrame& frame, const MeshPointers& pointers, std:
             },
             [&](std::size_t k) HWY_ATTR { return hn::Load(d, weights + kLanes * k); },
             load_deformed(d, pointers, b, lane), changes);
-        if (changes) store_deformed(d, pointers, b, lane, points);
+        if (changes) store_points(d, pointers, b, lane, points);
     }
 }
 

@@ -3,7 +3,6 @@
 
 #include <cstddef>
 
-#include "sinew/base/strided.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
@@ -28,7 +27,7 @@ struct BulgeFrame {
     float strength;
     bool is_stretched;  // some bone has a stretch other than 1
     Spaces spaces;
-    Strided<Vec3<float>> points;
+    Vec3<float>* points;
 };
 
 /// Functions for blocks [begin, end), compiled once for each instruction set.

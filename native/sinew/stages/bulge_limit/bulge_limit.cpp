@@ -59,14 +59,13 @@ struct BulgeLimit::State {
             bones[i] = bulge_bone({Vec3<double>(segments[i].head), Vec3<double>(segments[i].tail)}, 1.0);
         }
         // The kernel only reads them here.
-        const BulgeFrame all =
-            frame({const_cast<Vec3<float>*>(points.data()), points.size(), sizeof(points[0])});
+        const BulgeFrame all = frame(const_cast<Vec3<float>*>(points.data()));
         parallel_for_blocks(mesh, points.size(), 0, [&](std::size_t begin, std::size_t end) {
             kBulgeKernel.measure[target_in_use()](all, begin, end);
         });
     }
 
-    [[nodiscard]] BulgeFrame frame(Strided<Vec3<float>> points) const {
+    [[nodiscard]] BulgeFrame frame(Vec3<float>* points) const {
         // measure() alone writes the distances, and no other call runs at the same time.
         return {
             &mesh,
@@ -104,7 +103,7 @@ bool BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }
 std::size_t BulgeLimit::bone_count() const noexcept { return state_->packed->bone_count; }
 
-bool BulgeLimit::apply(Strided<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                        const BulgeLimitOptions& options) const noexcept {
     const State& state = *state_;
     if (points.size() != vertex_count()) return false;
@@ -122,7 +121,7 @@ bool BulgeLimit::apply(Strided<Vec3<float>> points, std::span<const Affine<float
         state.bones[i] =
             bulge_bone({transform_point(motion, rest.head), transform_point(motion, rest.tail)}, stretch);
     }
-    BulgeFrame frame = state.frame(points);
+    BulgeFrame frame = state.frame(points.data());
     frame.form = options.form;
     frame.is_stretched = is_stretched;
     frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);

@@ -260,14 +260,14 @@ std::size_t DeltaMush::iterations() const noexcept {
     return state_->bound->iterations;
 }
 
-bool DeltaMush::apply(Strided<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
+bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
     const State& state = *state_;
     const MushMesh& mesh = state.mesh;
     if (points.size() != mesh.vertices.size()) return false;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
     // Read once, because the compiler assumes that any stored number may change it.
-    const auto gather = [&, from = points](std::size_t begin, std::size_t end) {
+    const auto gather = [&, from = points.data()](std::size_t begin, std::size_t end) {
         const std::uint32_t* const of = mesh.vertices.data();
         Float4* const to = state.smoothed[0].data();
         end = std::min(end * MushMesh::kChunk, mesh.vertices.size());
@@ -281,7 +281,7 @@ bool DeltaMush::apply(Strided<Vec3<float>> points, float scale, std::size_t thre
                           .from = state.smoothed[state.smooth(*state.bound, threads)].data(),
                           .details = state.bound->details.data(),
                           .scale = scale,
-                          .points = points};
+                          .points = points.data()};
     const auto finish = [&](std::size_t begin, std::size_t end) {
         kMushKernel.finish[target_in_use()](frame, begin, end);
     };

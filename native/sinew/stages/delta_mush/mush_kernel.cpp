@@ -331,7 +331,7 @@ void finish(const MushFrame& frame, std::size_t begin, std::size_t end) {
         }
         // Read once, because the compiler assumes that any stored number may change it.
         const std::uint32_t* const vertices = mesh.vertices.data() + block.first_vertex;
-        const Strided<Vec3<float>> points = frame.points;
+        Vec3<float>* const points = frame.points;
         const std::size_t count = block.vertices;
         for (std::size_t i = 0; i < count; ++i) {
             std::memcpy(&points[vertices[i]], finished + i, sizeof(Vec3<float>));

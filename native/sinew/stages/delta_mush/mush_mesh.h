@@ -81,7 +81,7 @@ struct MushFrame {
     MushDetails* details = nullptr;  // output of take_details
     const Float4* rest = nullptr;    // of take_details
     float scale = 0.0f;
-    Strided<Vec3<float>> points{};  // output of finish: the caller's
+    Vec3<float>* points = nullptr;  // output of finish: the caller's
 };
 
 /// Functions for chunks [begin, end), compiled once for each instruction set.

@@ -16,7 +16,7 @@ constexpr std::size_t kBlocksAtOnce = 16;
 void mix_blocks(const std::array<const Kernel*, 2>& kernels, const std::array<Frame, 2>& frames,
                 const MixWeights& mix, std::size_t begin, std::size_t end) {
     const PackedMesh& mesh = *frames[0].mesh;
-    const std::span<Vec3<float>> points = frames[0].points;
+    Vec3<float>* const points = frames[0].points;
     const auto for_each_vertex = [&](const auto& call) {
         for (std::size_t b = begin; b < end; ++b) {
             for (std::size_t lane = 0; lane < mesh.blocks[b].vertices; ++lane) {

@@ -190,8 +190,8 @@ void spread_blocks(const TwistFrame& of, std::size_t begin, std::size_t end) {
             const auto sum = [&](Vec<Full> number, Vec<Full> more) HWY_ATTR {
                 return hn::IfThenElse(hn::Eq(more, zero), number, hn::Add(number, more));
             };
-            store_deformed(d, pointers, b, lane,
-                           Points<Full>{sum(point.x, by.x), sum(point.y, by.y), sum(point.z, by.z)});
+            store_points(d, pointers, b, lane,
+                         Points<Full>{sum(point.x, by.x), sum(point.y, by.y), sum(point.z, by.z)});
         }
     }
 }

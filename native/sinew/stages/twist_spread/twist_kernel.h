@@ -4,7 +4,6 @@
 #include <cstddef>
 #include <cstdint>
 
-#include "sinew/base/strided.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
 
@@ -70,7 +69,7 @@ struct TwistFrame {
     bool is_linear = true;                      // all blends are
     bool goes_around = false;  // a bone is farther than the shorter way, and a method blends the shorter way
     Spaces spaces;
-    Strided<Vec3<float>> points;
+    Vec3<float>* points;
 };
 
 /// Functions for `blocks` [begin, end), compiled once for each instruction set.

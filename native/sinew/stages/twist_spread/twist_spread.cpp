@@ -123,10 +123,10 @@ struct TwistSpread::State {
     /// Measures the vertices' shares and arms in the space of the bones.
     void measure(const Affine<float>& space) {
         space_rows = SpaceRows(space);
-        kTwistKernel.measure[target_in_use()](frame({}), 0, blocks.size());
+        kTwistKernel.measure[target_in_use()](frame(nullptr), 0, blocks.size());
     }
 
-    [[nodiscard]] TwistFrame frame(Strided<Vec3<float>> points) const noexcept {
+    [[nodiscard]] TwistFrame frame(Vec3<float>* points) const noexcept {
         return {.mesh = &mesh,
                 .rest_points = own_rest_points.empty() ? mesh.rest_points.data() : own_rest_points.data(),
                 .blocks = blocks.data(),
@@ -292,7 +292,7 @@ std::vector<float> TwistSpread::angles(std::span<const Affine<float>> posed_from
     return angles;
 }
 
-bool TwistSpread::apply(Strided<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                         const TwistSpreadOptions& options) const noexcept {
     const State& state = *state_;
     const auto fits = [&](std::size_t size) { return size == 0 || size == state.twists.size(); };
@@ -301,7 +301,7 @@ bool TwistSpread::apply(Strided<Vec3<float>> points, std::span<const Affine<floa
         return false;
     }
     const std::scoped_lock lock(state.mutex);
-    TwistFrame frame = state.frame(points);
+    TwistFrame frame = state.frame(points.data());
     frame.blend = options.blend;
     frame.mix_blend = state.mix.empty() ? options.blend : options.mix_blend;
     frame.is_linear = frame.blend == TwistBlend::linear && frame.mix_blend == TwistBlend::linear;
