@@ -31,7 +31,7 @@ VERSION = tomllib.loads(Path("pyproject.toml").read_text(encoding="utf-8"))["pro
 PACKAGE = ROOT / f"dist/sinew-{VERSION}.zip"
 
 WHEEL_PYTHONS = ("3.11", "3.13", "3.14")
-WHEEL_SOURCES = ("CMakeLists.txt", "pyproject.toml", "requirements/build.txt", "cmake", "native")
+WHEEL_SOURCES = ("CMakeLists.txt", "pyproject.toml", "requirements/build.txt", "native")
 # Packages that Sinew is compared with, not locked; one that does not install is left out. Of libigl the last
 # release with direct delta mush in Python.
 BENCH_PACKAGES, BENCH_PEERS = ("numpy>=2", "matplotlib>=3.8"), ("libigl==2.5.1", "usd-core>=24")
