@@ -305,6 +305,9 @@ def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
         adopt_pointers(obj)
     elif was_on:
         restore_builtin(obj)
+    if nodes is not None:
+        # In edit mode the Armature modifiers deform.
+        _set_icon(nodes, "show_in_editmode", False)
     smooths = {}
     for name in VIEWS:
         _switch_own(obj, nodes, f"show_{name}", on, was_on, in_depsgraph)

@@ -380,7 +380,10 @@ def switches_of(obj: bpy.types.Object) -> list:
     switches = []
     for modifier in obj.modifiers:
         switches += (modifier.name, modifier.show_viewport, modifier.show_render)
-        if modifier.type == "SUBSURF":
+        if modifier.type == "NODES":
+            # Sinew's is off there, and marked so in evaluated data (pose.icons_of).
+            switches.append(modifier.show_in_editmode)
+        elif modifier.type == "SUBSURF":
             # With 0 levels a Subdivision modifier is off.
             switches += (modifier.levels, modifier.render_levels)
     return switches

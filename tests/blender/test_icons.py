@@ -258,3 +258,17 @@ def test_keys_on_sinews_icon(view, rendered_points):
             assert scenes.worst(points, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
     attach.remove(obj)
     assert character.icons() == {"Armature": (True, True)}
+
+
+def test_sinews_icon_for_edit_mode_goes_off_again():
+    character, rule = Character(), Rule()
+    own = character.obj.modifiers["Sinew"]
+    for modifier in ("Armature", "Sinew", "Armature", "Sinew"):
+        own.show_in_editmode = True
+        for _at_once in range(2):
+            character.click(modifier, "viewport")
+            rule.click(modifier, "viewport")
+        character.click(modifier, "render")
+        rule.click(modifier, "render")
+        character.check(rule)
+        assert not own.show_in_editmode
