@@ -10,7 +10,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from enum import Enum
 
-VIEWPORT, RENDER = VIEWS = ("viewport", "render")
+VIEWS = ("viewport", "render")
 
 
 class Deformer(Enum):

@@ -2,6 +2,7 @@
 """Finds Sinew's modifier, the Armature modifiers, and those before and behind them in an object's stack."""
 
 import itertools
+from collections.abc import Iterator
 
 import bpy
 
@@ -83,19 +84,18 @@ def neutral_modifier(obj: bpy.types.Object) -> bpy.types.LaplacianDeformModifier
 
 def mark_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     """Returns Sinew's modifier that marks the mesh (undeformed.py), also without its node group."""
-    nodes = [m for m in obj.modifiers if m.type == "NODES"]
-    marks = (m for m in nodes if m.node_group and m.node_group.get(node_group.MARK) == node_group.STACK_MARK)
-    bare = [m for m in nodes if m.node_group is None]
+    bare = [m for m in obj.modifiers if m.type == "NODES" and m.node_group is None]
     same = (m for m in bare if m.persistent_uid == properties.of(obj).stack.mark_uid)
     named = (m for m in bare if m.name.startswith(MARK_NAME))
-    return next(itertools.chain(marks, same, named), None)
+    return next(itertools.chain(marks_with_group(obj), same, named), None)
 
 
-def has_mark(obj: bpy.types.Object) -> bool:
-    """Whether it has Sinew's modifier that marks the mesh, with its node group. Reads no settings, which
-    would make them."""
-    groups = (modifier.node_group for modifier in obj.modifiers if modifier.type == "NODES")
-    return any(group and group.get(node_group.MARK) == node_group.STACK_MARK for group in groups)
+def marks_with_group(obj: bpy.types.Object) -> Iterator[bpy.types.NodesModifier]:
+    """Yields those that mark the mesh, with their node group. Reads no settings, which would make them."""
+    for modifier in obj.modifiers:
+        group = modifier.node_group if modifier.type == "NODES" else None
+        if group is not None and group.get(node_group.MARK) == node_group.STACK_MARK:
+            yield modifier
 
 
 def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
@@ -152,7 +152,7 @@ def _start(obj: bpy.types.Object, own: list[bpy.types.Modifier]) -> int:
     ahead = min(start, len(modifiers)) - 1
     while ahead >= 0 and modifiers[ahead] in own:
         ahead -= 1
-    # So do others in place of those that are gone, if Sinew's is behind them, as it has switched them off.
+    # So do others in place of those that are gone, if Sinew's is behind them.
     while ahead >= 0 and (_deforms(modifiers[ahead]) or (not known and modifiers[ahead].type == "ARMATURE")):
         start, ahead = ahead, ahead - 1
     return start

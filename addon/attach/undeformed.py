@@ -186,7 +186,7 @@ def remove_later(obj: bpy.types.Object) -> None:
 def find_leftovers() -> None:
     """Called after undo and redo, which can bring back what remove_later() left until later."""
     for obj in bpy.data.objects:
-        if obj.type == "MESH" and not properties.has_sinew(obj) and stack.has_mark(obj):
+        if obj.type == "MESH" and not properties.has_sinew(obj) and any(stack.marks_with_group(obj)):
             remove_later(obj)
 
 

@@ -38,7 +38,8 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
         return ObjectFacts(enabled=False)
     if not is_linked:
         attach.follow_own_icons(obj)
-    viewport, render = (icons.deformer for icons in attach.icons_of(obj))
+    viewport, render = attach.icons_of(obj)
+    is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
     return ObjectFacts(
         enabled=settings.enabled,
         error=error,
@@ -48,8 +49,9 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
         visibility_is_keyed=stack.visibility_is_animated(obj),
         deformed_is_read=stack.is_deformed_mesh_read(obj),
         is_deforming_body=stack.is_deforming_body(obj),
-        viewport=viewport,
-        render=render,
+        viewport=viewport.deformer,
+        render=render.deformer,
+        views_differ=is_by_sinew and viewport.modifiers != render.modifiers,
     )
 
 
@@ -72,7 +74,6 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
         mesh_is_editable=mesh.is_editable,
         is_comparison_copy=properties.is_copy(obj),
         has_heat_map=settings.heat,
-        views_differ=_do_views_differ(obj),
         safe_mode=safe_mode.is_on(),
         failure=failure,
         waits_for=waits_for,
@@ -82,13 +83,6 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
         normals_obstacle=obstacle,
         normals_for_viewport_alone=bool(domain) and normals.is_for_viewport_alone(obj),
     )
-
-
-def _do_views_differ(obj: bpy.types.Object) -> bool:
-    """Whether Sinew deforms by other Armature modifiers in the viewport than in renders."""
-    viewport, render = attach.icons_of(obj)
-    is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
-    return is_by_sinew and viewport.modifiers != render.modifiers
 
 
 def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
