@@ -13,10 +13,11 @@ import bpy
 
 from ..base.errors import SinewError
 from ..base.phrases import phrase
-from ..io.actions import animated_paths, is_animated, is_visibility_animated
+from ..io.actions import animated_paths, is_animated
 from . import (
     baked,
     corrective_smooth,
+    layout,
     point_store,
     pose_driver,
     properties,
@@ -28,7 +29,9 @@ from . import (
     undeformed,
     upstream_proxy,
 )
-from .icons import VIEWS, Deformer, Icons
+from .icons import VIEWS, Deformer
+from .layout import Layout, method_of
+from .modifier_types import NEED_ORIGINAL_MESH
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -56,7 +59,7 @@ def armature_of(obj: bpy.types.Object) -> bpy.types.Object | None:
         found = next(same, None) or next(iter(kept), None)
         if found is not None and found.armature is not None:
             return found.armature
-    return obj.parent if modifier is None and stack.parent_deforms(obj) else None
+    return obj.parent if modifier is None and layout.parent_deforms(obj) else None
 
 
 def deformed_meshes(objects: list[bpy.types.Object]) -> list[bpy.types.Object]:
@@ -97,14 +100,15 @@ def check_can_add(obj: bpy.types.Object) -> None:
 def check_stack(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
     """Raises SinewError where an object's other modifiers, without types of `left_out`, do not permit
     Sinew's."""
-    upstream_proxy.check(obj)
-    check_behind(obj, left_out)
+    now = layout.read(obj)
+    upstream_proxy.check(obj, now)
+    check_behind(obj, now, left_out)
 
 
-def check_behind(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
+def check_behind(obj: bpy.types.Object, now: Layout, left_out: Collection[str] = ()) -> None:
     """Raises SinewError where a modifier behind, without types of `left_out`, does not permit Sinew's."""
-    for modifier in stack.downstream(obj):
-        if modifier.type in stack.NEED_ORIGINAL_MESH.difference(left_out):
+    for modifier in now.behind:
+        if modifier.kind in NEED_ORIGINAL_MESH.difference(left_out):
             raise SinewError(
                 f"{obj.name}: in front of {modifier.name} Blender permits only modifiers that just deform, "
                 "so not Sinew's; move it in front of the Armature modifier, or apply or remove it"
@@ -133,7 +137,7 @@ def _add(obj: bpy.types.Object, method: str | None, is_shown: bool) -> None:
     active, before = obj.modifiers.active, {modifier.name for modifier in obj.modifiers}
     try:
         _replace_modifiers(obj, method)
-        if is_shown and not stack.visibility_is_animated(obj):
+        if is_shown and not layout.read(obj).is_visibility_keyed:
             _switch_on_where_off(obj)
     except Exception as error:
         parent_type = properties.of(obj).before.parent_type
@@ -162,7 +166,7 @@ def _replace_modifiers(obj: bpy.types.Object, method: str | None) -> None:
     nodes.show_in_editmode = False
     _show(nodes, False, False)
     # Not to the end of the stack, where the artist may have pinned other modifiers.
-    stack.move_behind(obj, nodes, run[-1])
+    stack.move_behind(obj, nodes.name, run[-1].name)
     settings.before.had_animation = obj.animation_data is not None
     settings.method = method or method_of(run[0])
     properties.make_groups(settings)
@@ -177,7 +181,7 @@ def _switch_on_where_off(obj: bpy.types.Object) -> None:
     """Switches the Armature modifiers on where they are off in both views, and off what replaces them, such
     as a bake."""
     pairs = replaced_modifiers(obj)
-    if any(stack.is_on(modifier) for modifier, _replaced in pairs):
+    if any(modifier.show_viewport or modifier.show_render for modifier, _replaced in pairs):
         return
     for modifier, replaced in pairs:
         replaced.was_off = True
@@ -190,9 +194,8 @@ def notes(obj: bpy.types.Object) -> list[str]:
     and on what it switched off itself."""
     found = []
     settings = properties.of(obj)
-    if settings.method in MODIFIERS_OWN and any(
-        is_volume_followed(obj, m) for m, _ in replaced_modifiers(obj)
-    ):
+    is_animated = any(is_volume_followed(obj, skin) for skin in layout.read(obj).skins)
+    if settings.method in MODIFIERS_OWN and is_animated:
         text = "Its Preserve Volume is animated, and chooses between Linear Blend and Dual Quaternion"
         found.append(phrase(text))
     if undeformed.was_switched(obj):
@@ -212,20 +215,10 @@ def hangs_on(obj: bpy.types.Object, armatures: Collection[bpy.types.Object]) -> 
     return parent is not None
 
 
-def method_of(modifier: bpy.types.ArmatureModifier) -> str:
-    """Returns the method of the modifier itself."""
-    return "dq" if modifier.use_deform_preserve_volume else "lbs"
-
-
-def is_volume_animated(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> bool:
-    """Whether keys or drivers set its Preserve Volume."""
-    return is_animated(obj, modifier, "use_deform_preserve_volume")
-
-
-def is_volume_followed(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> bool:
-    """Whether an animated Preserve Volume decides between the two methods of the modifier itself. A copy in a
-    comparison has the method that its label names."""
-    return is_volume_animated(obj, modifier) and not properties.is_copy(obj)
+def is_volume_followed(obj: bpy.types.Object, skin: layout.Modifier) -> bool:
+    """Whether an animated Preserve Volume decides between the two methods of an Armature modifier itself. A
+    copy in a comparison has the method that its label names."""
+    return skin.armature.method == "" and not properties.is_copy(obj)
 
 
 def _make_modifier_of_parent(obj: bpy.types.Object) -> None:
@@ -308,13 +301,12 @@ def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
     if nodes is not None:
         # In edit mode the Armature modifiers deform.
         _set_icon(nodes, "show_in_editmode", False)
-    smooths = {}
     for name in VIEWS:
         _switch_own(obj, nodes, f"show_{name}", on, was_on, in_depsgraph)
-        smooths[name] = not on or _icons(obj, nodes, on, name).deformer is Deformer.ARMATURE
     undeformed.mark(obj, on)
-    corrective_smooth.switch(obj, **smooths)
     property_groups.store(settings.stack, "replaces_modifiers", on)
+    smooths = (not on or icons.deformer is Deformer.ARMATURE for icons in layout.read(obj).icons)
+    corrective_smooth.switch(obj, *smooths)
 
 
 def _switch_own(
@@ -362,32 +354,10 @@ def show(obj: bpy.types.Object) -> None:
         property_groups.store(settings.stack, f"show_{name}", True)
         if settings.replaces_modifiers and nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
             _set_icon(nodes, f"show_{name}", True)
-        if Deformer.NOTHING is _icons(obj, nodes, settings.replaces_modifiers, name).deformer:
+    for name, icons in zip(VIEWS, layout.read(obj).icons, strict=True):
+        if icons.deformer is Deformer.NOTHING:
             for modifier, _replaced in pairs:
                 _set_icon(modifier, f"show_{name}", True)
-
-
-def icons_of(obj: bpy.types.Object) -> tuple[Icons, Icons]:
-    """Returns the icons in the viewport and in renders, with those that Sinew's modifier has while Sinew is
-    on. One that is animated may be on in any frame."""
-    nodes, is_in_place = sinew_modifier(obj), properties.of(obj).replaces_modifiers
-    viewport, render = (_icons(obj, nodes, is_in_place, name) for name in VIEWS)
-    return viewport, render
-
-
-def _icons(
-    obj: bpy.types.Object, nodes: bpy.types.NodesModifier | None, is_in_place: bool, name: str
-) -> Icons:
-    icon = f"show_{name}"
-    own = nodes if is_in_place and nodes is not None else properties.of(obj).stack
-    is_own_shown = getattr(own, icon) or (nodes is not None and is_animated(obj, nodes, icon))
-    shown = (getattr(m, icon) or is_visibility_animated(obj, m) for m in stack.armature_modifiers(obj))
-    return Icons(is_own_shown, tuple(shown))
-
-
-def deforms(obj: bpy.types.Object) -> bool:
-    """Whether Sinew deforms it in one of the views while it is on."""
-    return any(icons.deformer is Deformer.SINEW for icons in icons_of(obj))
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
@@ -408,7 +378,7 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
         restore_volume(obj)
     for (modifier, replaced), wanted in zip(pairs, nearest, strict=True):
         own = modifier.use_deform_preserve_volume
-        if is_volume_animated(obj, modifier):
+        if is_animated(obj, modifier, "use_deform_preserve_volume"):
             wanted = own
         property_groups.store(replaced, "preserve_volume", own)
         property_groups.store(replaced, "was_nearest", own == wanted)
@@ -453,11 +423,13 @@ def _set_icon(modifier: bpy.types.Modifier, icon: str, value: bool) -> None:
 
 
 def _replaced_modifier(
-    obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier
+    obj: bpy.types.Object, now: Layout, modifier: bpy.types.ArmatureModifier
 ) -> properties.SinewReplacedModifier:
     """Returns what Sinew stores about an Armature modifier, and makes it where it is missing."""
     replaced_modifiers = properties.of(obj).replaced_modifiers
-    found = next((s for s in replaced_modifiers if stack.modifier_of(obj, s) == modifier), None)
+    kept = ((each, layout.find(now.modifiers, "ARMATURE", each)) for each in replaced_modifiers)
+    same = (each for each, number in kept if number is not None and obj.modifiers[number] == modifier)
+    found = next(same, None)
     if found is None:
         found = replaced_modifiers.add()
         found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
@@ -466,15 +438,18 @@ def _replaced_modifier(
     return found
 
 
-def replaced_modifiers(obj: bpy.types.Object) -> Replaced:
+def replaced_modifiers(obj: bpy.types.Object, now: Layout | None = None) -> Replaced:
     """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
-    it."""
-    run, kept = stack.armature_modifiers(obj), properties.of(obj).replaced_modifiers
-    count = len(kept)
-    pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
+    it.
+
+    now  the object's layout; None to read it
+    """
+    now, kept = now or layout.read(obj), properties.of(obj).replaced_modifiers
+    run, count = [obj.modifiers[name] for name in now.replaced], len(kept)
+    pairs = [(modifier, _replaced_modifier(obj, now, modifier)) for modifier in run]
     if len(kept) != count:
         # Adding one makes Blender move the earlier ones in memory.
-        pairs = [(modifier, _replaced_modifier(obj, modifier)) for modifier in run]
+        pairs = [(modifier, _replaced_modifier(obj, now, modifier)) for modifier in run]
     return pairs
 
 

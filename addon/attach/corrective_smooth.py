@@ -2,6 +2,7 @@
 """A Corrective Smooth directly behind the Armature modifiers can be replaced by the stage delta_mush: it then
 stays in the stack, switched off while Sinew deforms."""
 
+import itertools
 from collections.abc import Mapping
 from typing import Any
 
@@ -10,7 +11,7 @@ import bpy
 from ..base.errors import SinewError
 from ..base.phrases import Phrase, phrase
 from ..io.actions import animated_paths
-from . import properties, property_groups, stack, stage_settings, upstream_proxy
+from . import layout, properties, property_groups, stack, stage_settings, upstream_proxy
 
 # The modifier's property for each parameter of the stage.
 NAMES = {
@@ -24,8 +25,8 @@ NAMES = {
 
 def candidate(obj: bpy.types.Object) -> bpy.types.CorrectiveSmoothModifier | None:
     """Returns the first active Corrective Smooth behind the Armature modifiers, or None."""
-    found = (m for m in stack.downstream(obj) if m.type == "CORRECTIVE_SMOOTH" and stack.is_on(m))
-    return next(found, None)
+    found = (m.name for m in layout.read(obj).behind if m.kind == "CORRECTIVE_SMOOTH" and m.is_on)
+    return obj.modifiers.get(next(found, ""))
 
 
 def why_not(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> str:
@@ -59,8 +60,8 @@ def why_none(obj: bpy.types.Object) -> str:
 
 def _between(obj: bpy.types.Object, modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:
     """Returns the names of the active modifiers between it and the Armature modifiers."""
-    behind = stack.downstream(obj)
-    return [m.name for m in behind[: behind.index(modifier)] if stack.is_on(m)]
+    before = itertools.takewhile(lambda each: each.name != modifier.name, layout.read(obj).behind)
+    return [each.name for each in before if each.is_on]
 
 
 def _beyond_bounds(modifier: bpy.types.CorrectiveSmoothModifier) -> list[str]:

@@ -8,13 +8,10 @@ from dataclasses import dataclass
 import bpy
 import numpy as np
 
-from ..base.phrases import phrase
-from ..io.actions import animated_paths
 from ..skinning.influences import GroupWeights, entries_of_bones
 from ..skinning.rig import Bones, Weighting
-from . import stack
 
-_NAMES = (
+NAMES = (
     "use_vertex_groups",
     "use_bone_envelopes",
     "vertex_group",
@@ -43,7 +40,7 @@ class ModifierOptions:
     @staticmethod
     def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
         """Returns the same values in the same order, for quick comparison."""
-        return tuple(getattr(modifier, name) for name in _NAMES)
+        return tuple(getattr(modifier, name) for name in NAMES)
 
     def weighting(self, group_names: list[str], weights: GroupWeights, bones: Bones) -> Weighting:
         """Returns what deforms the mesh: its groups that have a bone, or no groups where the modifier does
@@ -61,25 +58,3 @@ class ModifierOptions:
             return None
         mask = weights.of_group(group_names.index(self.mask))
         return 1.0 - mask if self.invert_mask else mask
-
-
-def are_animated(obj: bpy.types.Object, modifier: bpy.types.ArmatureModifier) -> bool:
-    """Whether keys or drivers set one of the options."""
-    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].'
-    return not animated_paths(obj).isdisjoint(start + name for name in _NAMES)
-
-
-def differences(obj: bpy.types.Object) -> list[str]:
-    """Returns a sentence for each thing that the modifiers do and Sinew does not."""
-    found = []
-    skinned = stack.armature_modifiers(obj)
-    others = [m for m in obj.modifiers if m.type == "ARMATURE" and m not in skinned and m.object is not None]
-    if others:
-        found.append(
-            phrase(
-                "Armature modifiers apart from the first stay Blender's: {names}; move them right behind it "
-                "to have Sinew deform by them",
-                names=", ".join(modifier.name for modifier in others),
-            )
-        )
-    return found

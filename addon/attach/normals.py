@@ -18,8 +18,9 @@ import bpy
 
 from ..base.phrases import phrase
 from ..io import mesh_io
-from ..io.actions import is_animated, is_visibility_animated
-from . import node_group, properties, stack, upstream_proxy
+from . import node_group, properties, upstream_proxy
+from .layout import Layout, Modifier
+from .modifier_types import ONLY_DEFORM
 
 # False: Sinew leaves normals of the setting By Sinew to Blender, which computes them when they are read.
 are_used = True
@@ -35,7 +36,7 @@ HARMLESS_DOWNSTREAM = {
     "VERTEX_WEIGHT_PROXIMITY",
 }
 # Upstream, these keep faces, sharp edges and custom normals: they move points at most.
-_KEEPS_SHADING = {"UV_PROJECT", "UV_WARP"} | stack.ONLY_DEFORM.difference(
+_KEEPS_SHADING = {"UV_PROJECT", "UV_WARP"} | ONLY_DEFORM.difference(
     ("CLOTH", "COLLISION", "MESH_CACHE", "PARTICLE_SYSTEM", "SURFACE")
 )
 # These make the same faces and sharp edges whatever the points are, but other custom normals.
@@ -80,14 +81,14 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
     return domain if domain in ("POINT", "CORNER") else ""
 
 
-def obstacle(obj: bpy.types.Object) -> str:
+def obstacle(obj: bpy.types.Object, now: Layout) -> str:
     """Returns why Blender has to compute the normals of a skinned object, as a clause; empty where it need
     not."""
-    known = _known_upstream(obj)
-    for modifier in stack.upstream(obj):
-        if modifier.type not in known and stack.can_be_on(obj, modifier):
+    known = _known_upstream(obj, now)
+    for modifier in now.ahead:
+        if modifier.kind not in known and modifier.can_be_on:
             return phrase("{name} is in front", name=modifier.name)
-    for modifier in _needing(obj, in_renders=False):
+    for modifier in _needing(now, in_renders=False):
         return phrase("{name} follows", name=modifier.name)
     if obj.instance_type != "NONE":
         return "it has instances on its vertices or faces"
@@ -96,38 +97,30 @@ def obstacle(obj: bpy.types.Object) -> str:
     return ""
 
 
-def is_for_viewport_alone(obj: bpy.types.Object) -> bool:
+def is_for_viewport_alone(now: Layout) -> bool:
     """Whether Blender has to compute the normals in renders, for a downstream modifier that is on only
     there."""
-    return bool(_needing(obj, in_renders=True))
+    return bool(_needing(now, in_renders=True))
 
 
-def _known_upstream(obj: bpy.types.Object) -> set[str]:
+def _known_upstream(obj: bpy.types.Object, now: Layout) -> set[str]:
     """Returns the types of upstream modifiers whose result Sinew reads often enough."""
-    if upstream_proxy.changes_weights(obj):
+    if upstream_proxy.changes_weights(now):
         # Then everything is read again in each frame that changes it.
         return _KEEPS_SHADING | _KEEPS_FACES | upstream_proxy.WEIGHT_CHANGERS
     has_custom = mesh_io.find_attribute(obj.data, mesh_io.CUSTOM_NORMALS) is not None
     return _KEEPS_SHADING if has_custom else _KEEPS_SHADING | _KEEPS_FACES
 
 
-def _needing(obj: bpy.types.Object, in_renders: bool) -> list[bpy.types.Modifier]:
+def _needing(now: Layout, in_renders: bool) -> list[Modifier]:
     """Returns the downstream modifiers that need or change normals and can be on."""
     return [
-        modifier
-        for modifier in stack.downstream(obj)
-        if modifier.type not in HARMLESS_DOWNSTREAM and _can_be_on(obj, modifier, in_renders)
+        each
+        for each in now.behind
+        if each.kind not in HARMLESS_DOWNSTREAM
+        # With 0 levels a Subdivision modifier is off.
+        and (any(each.keyed) or (each.shown[in_renders] and each.levels[in_renders] != 0))
     ]
-
-
-def _can_be_on(obj: bpy.types.Object, modifier: bpy.types.Modifier, in_renders: bool) -> bool:
-    if is_visibility_animated(obj, modifier):
-        return True
-    if modifier.type == "SUBSURF":
-        levels = "render_levels" if in_renders else "levels"
-        if getattr(modifier, levels) == 0 and not is_animated(obj, modifier, levels):
-            return False
-    return modifier.show_render if in_renders else modifier.show_viewport
 
 
 def may_read_meshes(obj: bpy.types.Object) -> bool:

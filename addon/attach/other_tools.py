@@ -7,7 +7,8 @@ from collections.abc import Iterator
 import bpy
 
 from ..base.phrases import phrase
-from . import properties, stack, upstream_proxy
+from . import layout, properties, upstream_proxy
+from .modifier_types import ONLY_DEFORM
 
 # Such a tool also applies Sinew's modifier, and Sinew then removes the Armature modifiers.
 APPLYING = phrase(
@@ -19,12 +20,12 @@ def notes(obj: bpy.types.Object) -> list[str]:
     """Returns a sentence for each thing that goes wrong while Sinew deforms the mesh."""
     if not properties.of(obj).replaces_modifiers:
         return []
-    found, own = [], stack.own_modifiers(obj)
+    found, now = [], layout.read(obj)
     if upstream_proxy.shares_mesh(obj) and obj.data.users - obj.data.use_fake_user == 2:
         text = "Switch Sinew off before a script applies its modifiers: Sinew also uses its mesh meanwhile"
         found.append(phrase(text))
     # FBX files have no shape keys where any modifier but the Armature modifier is on.
-    others = [m for m in obj.modifiers if m.type != "ARMATURE" and m not in own and stack.is_on(m)]
+    others = [m for m in now.modifiers if m.kind != "ARMATURE" and m.name not in now.own and m.is_on]
     if obj.data.shape_keys is not None and not others:
         found.append(phrase("Switch Sinew off before an export to FBX, or the file has no shape keys"))
     return found
@@ -37,14 +38,14 @@ def warnings(obj: bpy.types.Object) -> list[str]:
 
 def _changed(obj: bpy.types.Object) -> Iterator[bpy.types.Modifier]:
     """Yields the downstream modifiers in front of which Sinew's is the first that does more than deform."""
-    if any(
-        modifier.type not in stack.ONLY_DEFORM for modifier in stack.upstream(obj) if stack.is_on(modifier)
-    ):
+    now = layout.read(obj)
+    if any(each.is_on and each.kind not in ONLY_DEFORM for each in now.ahead):
         return
-    for modifier in filter(stack.is_on, stack.downstream(obj)):
-        if modifier.type not in stack.ONLY_DEFORM:
-            return
-        yield modifier
+    for each in now.behind:
+        if each.is_on:
+            if each.kind not in ONLY_DEFORM:
+                return
+            yield obj.modifiers[each.name]
 
 
 def _warning(modifier: bpy.types.Modifier) -> str:

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 import bpy
 
 from ..io import mesh_io
-from . import node_group, properties, property_groups, references, stack
+from . import layout, node_group, properties, property_groups, references, stack
 
 # These make a mesh that has none of the attributes of what they get.
 _MAKE_A_MESH = {
@@ -37,7 +37,7 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
         _make_neutral(obj)
     _ensure_mark(obj)
     stack.position_own(obj)
-    can_mark = _can_mark(obj) and not loses_marks(obj)
+    can_mark = _can_mark(obj) and not loses_marks(obj, layout.read(obj))
     keeps = properties.of(obj).before.adds_rest_position or not can_mark
     return {
         node_group.IS_MARKED: can_mark,
@@ -45,14 +45,14 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
     }
 
 
-def loses_marks(obj: bpy.types.Object) -> bool:
+def loses_marks(obj: bpy.types.Object, now: layout.Layout) -> bool:
     """Whether modifiers in front can make another mesh, without the attribute: then the mesh can not be told
     from the undeformed one."""
-    changes = stack.upstream_changes(obj)
-    groups = [modifier.node_group for modifier in changes if modifier.type == "NODES"]
-    by_envelopes = any(modifier.use_bone_envelopes for modifier in stack.armature_modifiers(obj))
+    changes = now.changes_ahead
+    groups = [obj.modifiers[modifier.name].node_group for modifier in changes if modifier.kind == "NODES"]
+    by_envelopes = any(obj.modifiers[name].use_bone_envelopes for name in now.replaced)
     return (
-        not _MAKE_A_MESH.isdisjoint(modifier.type for modifier in changes)
+        not _MAKE_A_MESH.isdisjoint(modifier.kind for modifier in changes)
         or (by_envelopes and bool(groups))
         or any(_loses_mark(node) for node in _nodes_of(groups))
     )
@@ -97,7 +97,7 @@ def _make_neutral(obj: bpy.types.Object) -> None:
 
 
 def _ensure_mark(obj: bpy.types.Object) -> None:
-    mark = stack.mark_modifier(obj) or _new(obj, stack.MARK_NAME, "NODES")
+    mark = stack.mark_modifier(obj) or _new(obj, layout.MARK_NAME, "NODES")
     property_groups.store(properties.of(obj).stack, "mark_uid", mark.persistent_uid)
     group = node_group.get_or_make_stack_mark()
     if mark.node_group != group:
@@ -186,8 +186,12 @@ def remove_later(obj: bpy.types.Object) -> None:
 def find_leftovers() -> None:
     """Called after undo and redo, which can bring back what remove_later() left until later."""
     for obj in bpy.data.objects:
-        if obj.type == "MESH" and not properties.has_sinew(obj) and any(stack.marks_with_group(obj)):
+        if obj.type == "MESH" and not properties.has_sinew(obj) and _has_mark(obj):
             remove_later(obj)
+
+
+def _has_mark(obj: bpy.types.Object) -> bool:
+    return any(modifier.group == node_group.STACK_MARK for modifier in layout.read(obj).modifiers)
 
 
 def has_leftovers() -> bool:

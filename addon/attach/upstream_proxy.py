@@ -12,7 +12,9 @@ from ..base.errors import SinewError
 from ..io import mesh_compare
 from ..io.actions import animated_paths
 from ..skinning.influences import GroupWeights
-from . import node_group, properties, references, stack, undeformed
+from . import layout, node_group, properties, references, undeformed
+from .layout import Layout
+from .modifier_types import ONLY_DEFORM
 
 # A Multi Modifier directly behind one of these mixes with what it got, not with what it made.
 _MIXED_BY_MULTI_MODIFIERS = {"LATTICE", "MESH_DEFORM"}
@@ -61,11 +63,11 @@ _COPY = "sinew_copy"
 _MADE_FROM = "sinew_made_from"
 
 
-def is_needed(obj: bpy.types.Object) -> bool:
+def is_needed(obj: bpy.types.Object, now: Layout) -> bool:
     """Whether the Armature modifier gets anything other than the mesh and its relative shape keys."""
     keys = obj.data.shape_keys
     absolute = keys is not None and not keys.use_relative
-    return absolute or stack.parent_deforms(obj) or bool(stack.upstream_changes(obj))
+    return absolute or now.parent_deforms or bool(now.changes_ahead)
 
 
 def check_not_needed(obj: bpy.types.Object, why: str) -> None:
@@ -73,51 +75,52 @@ def check_not_needed(obj: bpy.types.Object, why: str) -> None:
 
     why  a clause: what does not work with it, and what to do
     """
-    if is_needed(obj):
-        names = ", ".join(m.name for m in stack.upstream_changes(obj)) or "what its stack"
+    now = layout.read(obj)
+    if is_needed(obj, now):
+        names = ", ".join(each.name for each in now.changes_ahead) or "what its stack"
         raise SinewError(f"{obj.name}: {names} changes the mesh ahead of the armature, {why}")
 
 
-def check(obj: bpy.types.Object) -> None:
+def check(obj: bpy.types.Object, now: Layout) -> None:
     """Raises SinewError where the upstream modifiers cannot be evaluated separately."""
-    first = stack.armature_modifier(obj)
-    if first is not None and first.use_multi_modifier and stack.parent_deforms(obj):
+    first = obj.modifiers[now.replaced[0]] if now.replaced else None
+    if first is not None and first.use_multi_modifier and now.parent_deforms:
         raise SinewError(
             f"{obj.name}: its first Armature modifier is a Multi Modifier, and its parent deforms it as well "
             "(parent type Armature); switch Multi Modifier off, or parent it by type Object"
         )
     # A parent deforms before all modifiers.
-    changes = [] if first is None else stack.upstream_changes(obj)
+    changes = () if first is None else now.changes_ahead
     if first is not None and first.use_multi_modifier and changes:
-        ahead = list(obj.modifiers)[list(obj.modifiers).index(first) - 1]
-        if ahead == changes[-1] and ahead.type in _MIXED_BY_MULTI_MODIFIERS:
+        ahead = now.modifiers[now.modifiers.index(now.skins[0]) - 1]
+        if ahead == changes[-1] and ahead.kind in _MIXED_BY_MULTI_MODIFIERS:
             raise SinewError(
                 f"{obj.name}: {first.name} is a Multi Modifier directly behind {ahead.name}, so it mixes "
                 "with the shape before that; switch Multi Modifier off, or put another modifier between them"
             )
     for modifier in changes:
-        if modifier.type in SIMULATIONS:
+        if modifier.kind in SIMULATIONS:
             raise SinewError(
-                f"{obj.name}: modifier {modifier.name} in front of {stack.armature_modifier(obj).name} is a "
-                "simulation, which Sinew can not run twice; apply it or move it behind"
+                f"{obj.name}: modifier {modifier.name} in front of {first.name} is a simulation, which Sinew "
+                "can not run twice; apply it or move it behind"
             )
 
 
 def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     """Returns the copy, made again where the upstream modifiers differ from its own, or set_outdated() said
     that the mesh does: comparing meshes takes long."""
-    storage = properties.of(obj).storage
-    if not is_needed(obj):
+    storage, now = properties.of(obj).storage, layout.read(obj)
+    if not is_needed(obj, now):
         remove(obj)
         return None
-    check(obj)
-    wanted, shares, proxy = signature(obj), _has_to_share_mesh(obj), storage.upstream_proxy
+    check(obj, now)
+    wanted, shares, proxy = signature(obj, now), _has_to_share_mesh(obj, now), storage.upstream_proxy
     if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares:
         # Never the old one with another mesh: see references.py.
         references.note(obj)
         old_mesh = proxy.data.session_uid if proxy is not None else 0
         remove(obj)
-        proxy = storage.upstream_proxy = _make(obj, shares)
+        proxy = storage.upstream_proxy = _make(obj, now, shares)
         proxy[_MADE_FROM] = wanted
         if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data, old_mesh):
             share_mesh(obj)
@@ -150,7 +153,7 @@ def share_mesh(obj: bpy.types.Object) -> None:
     _shared.add(obj.data.session_uid)
 
 
-def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
+def _has_to_share_mesh(obj: bpy.types.Object, now: Layout) -> bool:
     """Whether a copy of the mesh would have to be made again with each stroke, could be out of date, or would
     be of no use, as others use the mesh, too."""
     mesh = obj.data
@@ -158,7 +161,7 @@ def _has_to_share_mesh(obj: bpy.types.Object) -> bool:
         obj.mode != "OBJECT"
         or not mesh.is_editable
         or mesh.session_uid in _shared
-        or any(modifier.type in _READERS for modifier in stack.upstream(obj))
+        or any(each.kind in _READERS for each in now.ahead)
     ):
         return True
     has_copy = _has_copy(properties.of(obj).storage.upstream_proxy)
@@ -237,7 +240,8 @@ def _is_requested(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool
     """Whether Sinew's modifier needed the proxy's mesh in an evaluation. Blender may need only the transform,
     as a constraint's target: then it does not evaluate the upstream modifiers, and the mesh is their
     input."""
-    nodes = stack.sinew_modifier(obj.evaluated_get(depsgraph))
+    evaluated = obj.evaluated_get(depsgraph)
+    nodes = evaluated.modifiers.get(layout.read(evaluated).sinew)
     if depsgraph.mode == "RENDER":
         # visible_get() is of the viewport.
         is_shown = nodes is not None and nodes.show_render and not obj.hide_render
@@ -251,14 +255,14 @@ def _is_requested(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool
 def known_weights(obj: bpy.types.Object) -> GroupWeights | None:
     """Returns the weights of the mesh that the Armature modifier gets, where they are those of a copy that
     has been compared with the mesh; else None."""
-    if shares_mesh(obj) or any(m.type not in stack.ONLY_DEFORM for m in stack.upstream_changes(obj)):
+    if shares_mesh(obj) or any(each.kind not in ONLY_DEFORM for each in layout.read(obj).changes_ahead):
         return None
     return mesh_compare.weights_of(properties.of(obj).storage.upstream_proxy.data)
 
 
-def changes_weights(obj: bpy.types.Object) -> bool:
+def changes_weights(now: Layout) -> bool:
     """Whether weights can differ from frame to frame."""
-    return any(m.type in WEIGHT_CHANGERS for m in stack.upstream_changes(obj))
+    return any(each.kind in WEIGHT_CHANGERS for each in now.changes_ahead)
 
 
 def copy_that_follows(obj: bpy.types.Object, name: str) -> bpy.types.Object:
@@ -283,7 +287,7 @@ def _leave_simulations(copy: bpy.types.Object) -> None:
                 collection.objects.unlink(copy)
 
 
-def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
+def _make(obj: bpy.types.Object, now: Layout, shares: bool) -> bpy.types.Object:
     """shares: it has no copy of the mesh, but the mesh."""
     copy = copy_that_follows(obj, f"{obj.name} Sinew upstream")
     if not shares:
@@ -292,7 +296,7 @@ def _make(obj: bpy.types.Object, shares: bool) -> bpy.types.Object:
     copy.add_rest_position_attribute = undeformed.adds_rest_position(obj)
     identity = properties.of(copy).identity
     identity.is_helper, identity.token = True, copy.session_uid
-    wanted = {m.name for m in stack.upstream(obj)}
+    wanted = {each.name for each in now.ahead}
     for modifier in [m for m in copy.modifiers if m.name not in wanted]:
         copy.modifiers.remove(modifier)
     _keep_animation_of_modifiers(copy)
@@ -323,7 +327,7 @@ def _copy_of_mesh(obj: bpy.types.Object) -> bpy.types.Mesh:
 def _clear_parent(copy: bpy.types.Object) -> None:
     """Exporters also write children that are in no scene. An armature that deforms becomes a modifier; a
     lattice that does so stays the parent."""
-    if stack.parent_deforms(copy):
+    if layout.parent_deforms(copy):
         modifier = copy.modifiers.new("Parent", "ARMATURE")
         copy.modifiers.move(len(copy.modifiers) - 1, 0)
         modifier.object, modifier.use_bone_envelopes = copy.parent, True
@@ -359,14 +363,14 @@ def _follow_simplify(copy: bpy.types.Object) -> None:
             target.context_property, target.data_path = "ACTIVE_SCENE", f"render.{name}"
 
 
-def signature(obj: bpy.types.Object) -> str:
+def signature(obj: bpy.types.Object, now: Layout) -> str:
     """Returns a text that differs where the copy would: by the settings of the upstream modifiers, the pinned
     shape key and Add Rest Position."""
     pinned = obj.active_shape_key_index if obj.show_only_shape_key else None
     animation = obj.animation_data
     action = animation.action.session_uid if animation is not None and animation.action is not None else 0
     animated = tuple(path for path in animated_paths(obj) if path.startswith("modifiers["))
-    modifiers = [_modifier_values(modifier, animated) for modifier in stack.upstream(obj)]
+    modifiers = [_modifier_values(obj.modifiers[each.name], animated) for each in now.ahead]
     parent = (obj.parent_type, obj.parent and obj.parent.session_uid, obj.parent_bone)
     return repr((pinned, undeformed.adds_rest_position(obj), action, parent, modifiers))
 

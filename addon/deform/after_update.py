@@ -88,7 +88,7 @@ def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: b
         return
     if not source.is_ready(obj, depsgraph):
         raise SinewError(f"{obj.name}: Blender has not evaluated what is in front of Sinew yet")
-    if skinned.noted.options_keyed and bound.is_of_other_modifiers(obj, skinned.bound, depsgraph):
+    if skinned.noted.are_options_keyed and bound.is_of_other_modifiers(obj, skinned.bound, depsgraph):
         skinned.bind(bound.read(obj, depsgraph))
     if skinned.needs_recheck:
         changes = Changes(meshes={obj.data.session_uid})

@@ -9,6 +9,7 @@ import numpy as np
 
 from ..attach import (
     attach,
+    layout,
     node_group,
     normals,
     point_store,
@@ -38,17 +39,18 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
         return ObjectFacts(enabled=False)
     if not is_linked:
         attach.follow_own_icons(obj)
-    viewport, render = attach.icons_of(obj)
+    now = layout.read(obj)
+    viewport, render = now.icons
     is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
     return ObjectFacts(
         enabled=settings.enabled,
         error=error,
         is_linked=is_linked,
         mode=mode_of(obj),
-        has_upstream=upstream_proxy.is_needed(obj),
-        visibility_is_keyed=stack.visibility_is_animated(obj),
-        deformed_is_read=stack.is_deformed_mesh_read(obj),
-        is_deforming_body=stack.is_deforming_body(obj),
+        has_upstream=upstream_proxy.is_needed(obj, now),
+        visibility_is_keyed=now.is_visibility_keyed,
+        deformed_is_read=now.is_deformed_read,
+        is_deforming_body=now.is_deforming_body,
         viewport=viewport.deformer,
         render=render.deformer,
         views_differ=is_by_sinew and viewport.modifiers != render.modifiers,
@@ -61,15 +63,15 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
     failure    the error when Sinew deformed it within Blender's evaluation
     waits_for  what its method needs and is not computed yet
     """
-    settings, mesh = properties.of(obj), obj.data
+    settings, mesh, now = properties.of(obj), obj.data, layout.read(obj)
     gives_normals = normals.are_given(settings)
     domain = normals.domain_of(mesh) if gives_normals else ""
-    obstacle = normals.obstacle(obj) if domain else ""
+    obstacle = normals.obstacle(obj, now) if domain else ""
     given = normals.kind_of(mesh, "" if obstacle else domain)
     return replace(
         first_facts(obj, error=""),
-        builtin_is_faster=small_meshes.is_builtin_faster(obj, given),
-        upstream_changes_weights=upstream_proxy.changes_weights(obj),
+        builtin_is_faster=small_meshes.is_builtin_faster(obj, now, given),
+        upstream_changes_weights=upstream_proxy.changes_weights(now),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
         mesh_is_editable=mesh.is_editable,
         is_comparison_copy=properties.is_copy(obj),
@@ -81,7 +83,7 @@ def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFact
         skins_normals=settings.normals == properties.SKINNED_NORMALS,
         normals_domain=domain,
         normals_obstacle=obstacle,
-        normals_for_viewport_alone=bool(domain) and normals.is_for_viewport_alone(obj),
+        normals_for_viewport_alone=bool(domain) and normals.is_for_viewport_alone(now),
     )
 
 
@@ -106,7 +108,7 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
             upstream_proxy.remove(obj)
         elif obj.mode not in ARMATURE_MODIFIER_MODES:
             point_store.remove(obj)
-        is_shown = mode_of(obj) in ARMATURE_MODIFIER_MODES and attach.deforms(obj)
+        is_shown = mode_of(obj) in ARMATURE_MODIFIER_MODES and layout.read(obj).deforms
         if wanted.state is State.EDITING and is_shown and small_meshes.has_builtin_shape(obj):
             attach.use_nearest_volume(obj)
         else:
@@ -143,7 +145,7 @@ def apply_saved(obj: bpy.types.Object, plan: Plan) -> None:
     attach.switch(obj, on=False)
     # What was set for a mode may not be the nearest.
     attach.restore_volume(obj)
-    if attach.deforms(obj) and plan.state is not State.REFUSED:
+    if layout.read(obj).deforms and plan.state is not State.REFUSED:
         attach.use_nearest_volume(obj)
 
 
@@ -220,7 +222,7 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
     settings, others = properties.of(obj), properties.of(origin)
     properties.share(origin, obj)
     property_groups.copy(others.before.smooth, settings.before.smooth)
-    for name, icons in zip(VIEWS, attach.icons_of(origin), strict=True):
+    for name, icons in zip(VIEWS, layout.read(origin).icons, strict=True):
         property_groups.store(settings.stack, f"show_{name}", icons.sinew)
     for replaced in settings.replaced_modifiers:
         replaced.was_off = replaced.name in kept and kept[replaced.name].was_off

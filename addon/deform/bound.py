@@ -10,8 +10,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..attach import attach, properties, stage_settings
-from ..attach.modifier_options import ModifierOptions, are_animated
+from ..attach import attach, layout, properties, stage_settings
+from ..attach.modifier_options import ModifierOptions
 from ..attach.properties import METHODS
 from ..base.phrases import phrase
 from ..io import armature_io, spaces
@@ -190,8 +190,8 @@ def _options_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[M
     evaluated = obj.evaluated_get(depsgraph).modifiers
     return [
         # Of a hidden object, what the artist changes is not evaluated.
-        ModifierOptions.read(evaluated.get(m.name, m) if are_animated(obj, m) else m)
-        for m, _replaced in attach.replaced_modifiers(obj)
+        skin.armature.options or ModifierOptions.read(evaluated.get(skin.name, obj.modifiers[skin.name]))
+        for skin in layout.read(obj).skins
     ]
 
 

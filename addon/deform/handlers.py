@@ -38,7 +38,7 @@ def _take_off_drivers_without_modifier() -> None:
             return
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
-                is_missing = state.plan.is_in_depsgraph and obj.modifiers.get(state.noted.modifier) is None
+                is_missing = state.plan.is_in_depsgraph and state.noted.layout.sinew not in obj.modifiers
                 # The modifier may have been renamed.
                 if is_missing and obj.is_editable and stack.sinew_modifier(obj) is None:
                     pose_driver.remove(obj)

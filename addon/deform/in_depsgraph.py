@@ -13,8 +13,9 @@ import bpy
 import numpy as np
 import sinew
 
-from ..attach import point_store, properties, stack
+from ..attach import point_store, properties
 from ..attach.icons import VIEWS, Deformer, Icons
+from ..attach.layout import is_deforming_body
 from ..attach.modifier_options import ModifierOptions
 from ..io import mesh_io
 from ..io.actions import animated_paths
@@ -83,15 +84,15 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     # Evaluated ones, as the driver reads them.
     modifiers = [(replaced, replaced.armature) for replaced in settings.replaced_modifiers]
     is_own_mesh = skinned.evaluation.is_only_user or skinned.plan.in_buffer
-    if skinned.noted.mode != evaluated.mode or not is_own_mesh:
+    if skinned.noted.layout.mode != evaluated.mode or not is_own_mesh:
         return "its mode, or the users of its mesh, changed"
     if [armature is None for _replaced, armature in modifiers] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
-    if skinned.noted.options_keyed and bound.options != [
+    if skinned.noted.are_options_keyed and bound.options != [
         ModifierOptions.read(evaluated.modifiers[replaced.name]) for replaced, _armature in modifiers
     ]:
         return "an animation set options of its Armature modifiers"
-    if skinned.plan.leaves_out and stack.is_deforming_body(evaluated):
+    if skinned.plan.leaves_out and is_deforming_body(evaluated):
         return "it has become a rigid body that reads its deformed mesh"
     memory = _memory_to_write(settings, mesh, skinned)
     if memory is None:
@@ -132,19 +133,19 @@ def _leave_out(
     if any(".show_" in path for path in animated_paths(evaluated)):
         # An animation that was just added decides from now on.
         return
-    stack_now, own = evaluated.modifiers, {skinned.noted.modifier, *skinned.noted.helping}
+    stack_now, known = evaluated.modifiers, skinned.noted.layout
     left_out = {replaced.name for replaced, _armature in modifiers}
     for view, of_view in zip(VIEWS, icons, strict=True):
         is_by_sinew = of_view.deformer is Deformer.SINEW
         shown = [
             is_by_sinew
-            if m.name in own
+            if m.name in known.own
             else getattr(m, f"show_{view}") and not (is_by_sinew and m.name in left_out)
             for m in stack_now
         ]
         stack_now.foreach_set(f"show_{view}", shown)
     # A mark, which goes when Blender copies the icons from the original again (pose.icons_of).
-    marked = [m.show_in_editmode or m.name == skinned.noted.modifier for m in stack_now]
+    marked = [m.show_in_editmode or m.name == known.sinew for m in stack_now]
     stack_now.foreach_set("show_in_editmode", marked)
 
 

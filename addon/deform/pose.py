@@ -6,8 +6,9 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..attach import attach, properties, stage_settings
+from ..attach import attach, properties, stack, stage_settings
 from ..attach.icons import Deformer, Icons
+from ..attach.layout import method_of
 from ..base.errors import SinewError
 from ..io import armature_io, spaces
 from ..skinning import parameters
@@ -72,12 +73,12 @@ def read(
         own = properties.method_of_modifier(method, replaced.method, is_first=number == 0)
         is_mixed = skin.deformer.mix_weights is not None and own == method
         if skinned.noted.volume_keyed[number] and own in attach.MODIFIERS_OWN:
-            own = attach.method_of(evaluated.modifiers[replaced.name])
+            own = method_of(evaluated.modifiers[replaced.name])
         mix = settings.mixed_method if is_mixed else ""
         data = skin.deformer.vertex_data
         if data is not None and not data.is_ready(own):
             # The modifier's own method, until what the chosen one needs is computed.
-            own, mix = attach.method_of(evaluated.modifiers[replaced.name]), ""
+            own, mix = method_of(evaluated.modifiers[replaced.name]), ""
         elif data is not None and mix and not data.is_ready(mix):
             mix = ""
         values = _parameters(evaluated, settings, own, mix)
@@ -106,7 +107,7 @@ def _finite(pose: np.ndarray, bones: Bones) -> np.ndarray:
 
 def of_modifiers(obj: bpy.types.Object, frames: Frames) -> Frames:
     """Returns the same poses with the methods of the Armature modifiers themselves, without stages."""
-    methods = [attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj)]
+    methods = [method_of(modifier) for modifier in stack.armature_modifiers(obj)]
     return [
         frame and replace(frame, method=method, mix="", parameters={}, scale_rule=BLENDER_4.name)
         for frame, method in zip(frames, methods, strict=False)
@@ -158,7 +159,7 @@ def icons_of(
     evaluated: bpy.types.Object, modifiers: Modifiers, skinned: SkinnedObject
 ) -> tuple[Icons, Icons]:
     """Returns the icons in the viewport and in renders, as the artist or an animation set them."""
-    own = evaluated.modifiers[skinned.noted.modifier]
+    own = evaluated.modifiers[skinned.noted.layout.sinew]
     # Otherwise in_depsgraph.py has switched them since Blender copied them.
     if not own.show_in_editmode or skinned.evaluation.icons is None:
         replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]

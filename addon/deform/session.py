@@ -10,7 +10,7 @@ import bpy
 import numpy as np
 
 from ..attach import (
-    attach,
+    layout,
     node_group,
     normals,
     orphans,
@@ -360,7 +360,7 @@ def waiting() -> set[tuple[int, int]]:
         for obj in objects_with_sinew(Changes())
         if plan_of(obj).state is State.WAITING_UPSTREAM
         and properties.of(obj).replaces_modifiers
-        and attach.icons_of(obj)[0].sinew
+        and layout.read(obj).icons[0].sinew
     }
 
 

@@ -10,9 +10,9 @@ import bpy
 import numpy as np
 import sinew
 
-from ..attach import attach, normals, properties, stack, stage_settings, undeformed, upstream_proxy
+from ..attach import attach, layout, normals, properties, stage_settings, undeformed, upstream_proxy
 from ..attach.icons import Icons
-from ..attach.modifier_options import ModifierOptions, are_animated
+from ..attach.layout import Layout
 from ..base.errors import SinewError
 from ..io import armature_io, mesh_io
 from ..io.actions import animated_paths
@@ -89,16 +89,13 @@ class Evaluation:
 class Noted:
     """An object as it was when its plan was applied. Immutable: it is replaced as a whole.
 
-    modifier             the name of Sinew's modifier, by which it is found again
-    helping              the names of those around it that change nothing
+    layout               its stack
     attribute            the mesh's point attribute; empty where the point buffer has the points
     normals_domain       the normals that drew the mesh, as from normals.domain_of()
     mesh_users           the number of users of the mesh; with several, another could read while Sinew writes
     volume_keyed         for each Armature modifier, whether an animation chooses between its two methods
-    options_keyed        an animation sets other options of an Armature modifier
     rests                from rests_of()
-    state                what the artist can change about the object itself, from _own_facts()
-    switches             a part of the state, from switches_of()
+    state                what else the artist can change about the object itself, from _own_facts()
     surroundings         from surroundings_of()
     groups               the names of its vertex groups
     loses_marks          as from undeformed.loses_marks()
@@ -109,17 +106,13 @@ class Noted:
     """
 
     name: str
-    mode: str
-    modifier: str
-    helping: list[str]
+    layout: Layout
     attribute: str
     normals_domain: str
     mesh_users: int
     volume_keyed: list[bool]
-    options_keyed: bool
     rests: list[int | None]
     state: list
-    switches: list
     surroundings: list
     groups: list[str]
     loses_marks: bool
@@ -132,28 +125,29 @@ class Noted:
     def of(cls, obj: bpy.types.Object, plan: Plan, bound: Bound) -> Noted:
         storage, mesh = properties.of(obj).storage, obj.data
         own = {obj.session_uid, mesh.session_uid, uid(mesh.shape_keys), uid(storage.upstream_proxy)}
-        modifiers = stack.armature_modifiers(obj)
+        now = layout.read(obj)
         return cls(
             name=obj.name,
-            mode=obj.mode,
-            modifier=stack.sinew_modifier(obj).name,
-            helping=[modifier.name for modifier in stack.helping_modifiers(obj)],
+            layout=now,
             attribute=storage.attribute,
             normals_domain=normals.domain_of(mesh),
             mesh_users=mesh.users,
-            volume_keyed=[attach.is_volume_followed(obj, m) for m in modifiers],
-            options_keyed=any(are_animated(obj, m) for m in modifiers),
+            volume_keyed=[attach.is_volume_followed(obj, skin) for skin in now.skins],
             rests=rests_of(obj),
-            state=_own_facts(obj),
-            switches=switches_of(obj),
+            state=_own_facts(obj, now),
             surroundings=surroundings_of(obj),
             groups=obj.vertex_groups.keys(),
-            loses_marks=undeformed.loses_marks(obj),
+            loses_marks=undeformed.loses_marks(obj, now),
             dependencies=own | set(bound.armatures),
             builtin_fingerprint=small_meshes.fingerprint(obj) if plan.uses_builtin else [],
             data_versions=bound.data_versions,
             volume=obj.matrix_world.determinant(),
         )
+
+    @property
+    def are_options_keyed(self) -> bool:
+        """Whether an animation sets options of an Armature modifier beside Preserve Volume."""
+        return any(skin.armature.options is None for skin in self.layout.skins)
 
 
 @dataclass
@@ -242,7 +236,8 @@ class SkinnedObject:
         if self.needs_recheck or obj.data.session_uid in meshes:
             return False
         # Where vertex groups are added, removed or renamed, Blender lists the scene as changed, too.
-        return self.noted.mode == obj.mode and self.noted.state == _own_facts(obj)
+        now = layout.read(obj)
+        return self.noted.layout == now and self.noted.state == _own_facts(obj, now)
 
     def was_only_posed(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> bool:
         """Whether the last evaluation gave the object its shape, and nothing else has to be checked.
@@ -256,7 +251,7 @@ class SkinnedObject:
         return (
             self.was_deformed(obj, depsgraph)
             and self.noted.name == obj.name
-            and self.noted.switches == switches_of(obj)
+            and self.noted.layout.has_switches_of(obj)
             and isclose(obj.matrix_world.determinant(), self.noted.volume, rel_tol=stage_settings.SAME_SCALE)
             and not self.have_bones_changed(obj, depsgraph, changes)
         )
@@ -289,11 +284,14 @@ class SkinnedObject:
 
     def is_as_noted(self, obj: bpy.types.Object) -> bool:
         """Whether the object itself is as it was when the plan was applied."""
-        if self.noted.state != _own_facts(obj) or self.noted.groups != obj.vertex_groups.keys():
+        now = layout.read(obj)
+        if self.noted.layout != now or self.noted.groups != obj.vertex_groups.keys():
+            return False
+        if self.noted.state != _own_facts(obj, now):
             return False
         # Going through the nodes in front takes long; without a proxy there are none.
         has_proxy = properties.of(obj).storage.upstream_proxy is not None
-        return not has_proxy or self.noted.loses_marks == undeformed.loses_marks(obj)
+        return not has_proxy or self.noted.loses_marks == undeformed.loses_marks(obj, now)
 
     def has_same_surroundings(self, obj: bpy.types.Object) -> bool:
         """Whether the data around it is as it was when the plan was applied."""
@@ -316,15 +314,15 @@ class SkinnedObject:
     def is_attached(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's
         handler can remove them without any event."""
-        modifier = obj.modifiers.get(self.noted.modifier)
+        modifier = obj.modifiers.get(self.noted.layout.sinew)
         if self.plan.uses_builtin:
             return modifier is not None
         return getattr(modifier, "node_group", None) is not None
 
 
-def _own_facts(obj: bpy.types.Object) -> list:
+def _own_facts(obj: bpy.types.Object, now: Layout) -> list:
     """Everything about the object itself that the artist can change and that decides how it is deformed, but
-    for its vertex groups."""
+    for its vertex groups and its stack."""
     settings = properties.of(obj)
     mesh, keys = obj.data, obj.data.shape_keys
     state = [
@@ -335,23 +333,13 @@ def _own_facts(obj: bpy.types.Object) -> list:
         mesh.users,
         obj.show_only_shape_key,
         obj.instance_type,
-        stack.is_deformed_mesh_read(obj),
         keys is None or keys.use_relative,
     ]
     if settings.storage.upstream_proxy is not None:
-        state.append(upstream_proxy.signature(obj))
+        state.append(upstream_proxy.signature(obj, now))
     state += [armature.mode for armature in settings.armatures] + rests_of(obj)
     # Adding an animation has no event of its own.
-    state += sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
-    for modifier in obj.modifiers:
-        if modifier.type == "ARMATURE":
-            state.append(uid(modifier.object))
-            # What animation sets is followed in each evaluation.
-            if not attach.is_volume_animated(obj, modifier):
-                state.append(attach.method_of(modifier))
-            if not are_animated(obj, modifier):
-                state += ModifierOptions.values(modifier)
-    return state + switches_of(obj)
+    return state + sorted(path for path in animated_paths(obj) if path.startswith(("sinew.", "modifiers")))
 
 
 def rests_of(obj: bpy.types.Object) -> list[int | None]:
@@ -373,17 +361,3 @@ def surroundings_of(obj: bpy.types.Object) -> list:
         [attach.is_deleted(armature) for armature in settings.armatures],
         gives_normals and normals.is_read_by_others(obj),
     ]
-
-
-def switches_of(obj: bpy.types.Object) -> list:
-    """The names of the object's modifiers, and what switches them on and off."""
-    switches = []
-    for modifier in obj.modifiers:
-        switches += (modifier.name, modifier.show_viewport, modifier.show_render)
-        if modifier.type == "NODES":
-            # Sinew's is off there, and marked so in evaluated data (pose.icons_of).
-            switches.append(modifier.show_in_editmode)
-        elif modifier.type == "SUBSURF":
-            # With 0 levels a Subdivision modifier is off.
-            switches += (modifier.levels, modifier.render_levels)
-    return switches

@@ -7,7 +7,8 @@ Sinew stays on and can measure, bake and compare as usual; only who deforms each
 
 import bpy
 
-from ..attach import attach, pose_driver, properties, stage_settings, upstream_proxy
+from ..attach import attach, layout, pose_driver, properties, stage_settings, upstream_proxy
+from ..attach.layout import Layout, method_of
 from ..attach.normals import Kind
 from ..io.actions import animated_paths
 from ..skinning.scale_rule import BLENDER_4
@@ -24,7 +25,7 @@ VERTICES_WITH_NORMALS = {
 is_used = True
 
 
-def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
+def is_builtin_faster(obj: bpy.types.Object, now: Layout, given: Kind | None) -> bool:
     """Whether the Armature modifiers of a skinned object, as they are set, give its shape in less time.
 
     given  the normals that Sinew would give along with it; None where Blender computes them
@@ -39,7 +40,7 @@ def is_builtin_faster(obj: bpy.types.Object, given: Kind | None) -> bool:
         and not settings.heat
         and has_builtin_shape(obj)
         and not other_volume(obj)
-        and not upstream_proxy.is_needed(obj)
+        and not upstream_proxy.is_needed(obj, now)
         and not any(p.startswith("sinew.") and p != pose_driver.PATH for p in animated_paths(obj))
     )
 
@@ -59,13 +60,13 @@ def has_builtin_shape(obj: bpy.types.Object) -> bool:
 def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
     """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method and is not
     followed."""
-    method = properties.of(obj).method
+    method, now = properties.of(obj).method, layout.read(obj)
+    pairs = zip(now.skins, attach.replaced_modifiers(obj, now), strict=True)
     return [
         modifier
-        for number, (modifier, replaced) in enumerate(attach.replaced_modifiers(obj))
-        if attach.method_of(modifier)
-        != properties.method_of_modifier(method, replaced.method, is_first=number == 0)
-        and not attach.is_volume_followed(obj, modifier)
+        for number, (skin, (modifier, replaced)) in enumerate(pairs)
+        if method_of(modifier) != properties.method_of_modifier(method, replaced.method, is_first=number == 0)
+        and not attach.is_volume_followed(obj, skin)
     ]
 
 
@@ -74,6 +75,6 @@ def fingerprint(obj: bpy.types.Object) -> list[str]:
     frames without an event."""
     settings = properties.of(obj)
     modifiers = [obj.modifiers.get(replaced.name) for replaced in settings.replaced_modifiers]
-    methods = [attach.method_of(modifier) if modifier is not None else "" for modifier in modifiers]
+    methods = [method_of(modifier) if modifier is not None else "" for modifier in modifiers]
     own = [settings.method, settings.scale_rule, str(stage_settings.has_defaults(settings, VERTICES))]
     return [*own, *stage_settings.names_on(settings), *methods]

@@ -10,7 +10,7 @@ from functools import cached_property
 import bpy
 import numpy as np
 
-from ..attach import normals, properties, stored_vertex_data, upstream_proxy
+from ..attach import layout, normals, properties, stored_vertex_data, upstream_proxy
 from ..io import mesh_io
 from ..skinning.arrays import are_equal
 from ..skinning.influences import GroupWeights
@@ -201,7 +201,7 @@ def has_changed(
         evaluated = helper.session_uid in changes.objects
         if len(mesh.vertices) != len(source.points) or obj.data.session_uid in changes.meshes:
             return True
-        return evaluated and (not changes.frame or upstream_proxy.changes_weights(obj))
+        return evaluated and (not changes.frame or upstream_proxy.changes_weights(layout.read(obj)))
     mesh, keys, known = obj.data, obj.data.shape_keys, source.shape_keys
     if len(mesh.vertices) != len(source.points) or (keys is None) != (known is None):
         return True

@@ -4,15 +4,14 @@
 import bpy
 import numpy as np
 
-from ..attach import attach, other_tools, properties, stack, stage_settings
-from ..attach.modifier_options import ModifierOptions, differences
+from ..attach import attach, group_uses, layout, other_tools, properties, stack, stage_settings
+from ..attach.modifier_options import ModifierOptions
 from ..base.errors import SinewError
 from ..base.phrases import phrase
 from ..io import armature_io, mesh_io, spaces
 from ..skinning import sdef
 from ..skinning.rig import RigFacts, Weighting, describe_rig
 from ..skinning.vectors import transformed
-from . import group_uses
 
 
 def describe(
@@ -35,8 +34,20 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    found = [*differences(obj), *_missing_groups(obj), *_other_sdef(obj), *other_tools.warnings(obj)]
+    found = [*_apart(obj), *_missing_groups(obj), *_other_sdef(obj), *other_tools.warnings(obj)]
     return facts.with_warnings(found)
+
+
+def _apart(obj: bpy.types.Object) -> list[str]:
+    """Returns a sentence where Armature modifiers do not directly follow the first."""
+    now = layout.read(obj)
+    apart = [m.name for m in now.modifiers if m.armature is not None and m not in now.skins]
+    names = [name for name in apart if now.by_name[name].armature.armature]
+    text = (
+        "Armature modifiers apart from the first stay Blender's: {names}; move them right behind it to have "
+        "Sinew deform by them"
+    )
+    return [phrase(text, names=", ".join(names))] if names else []
 
 
 def _other_sdef(obj: bpy.types.Object) -> list[str]:

@@ -45,7 +45,7 @@ def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.
         and not (plan.in_buffer or state.bound.source.from_upstream)
         and not (state.needs_recheck or state.needs_apply)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
-        and obj.mode == state.noted.mode == "OBJECT"
+        and obj.mode == state.noted.layout.mode == "OBJECT"
         and _is_shown(obj, depsgraph)
     )
 

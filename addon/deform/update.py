@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import bpy
 
-from ..attach import attach, normals, point_store, properties, stack, stage_settings, upstream_proxy
+from ..attach import attach, layout, normals, point_store, properties, stack, stage_settings, upstream_proxy
 from ..attach.updates import may_change_file
 from ..base.errors import SinewError
 from ..io import armature_io
@@ -94,9 +94,9 @@ class _Event:
             is_due=skinned.needs_apply or skinned.has_new_data or (may_change and self._follows_scale()),
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
-            is_other=skinned.noted.mode != apply_plan.mode_of(obj)
+            is_other=skinned.noted.layout.mode != apply_plan.mode_of(obj)
             or self._find_outdated_copy()
-            or (skinned.noted.options_keyed and self._has_other_modifiers(skinned)),
+            or (skinned.noted.are_options_keyed and self._has_other_modifiers(skinned)),
             is_untouched=skinned.is_untouched_by(changes),
         )
         if facts.calls_for_plan or facts.is_untouched:
@@ -277,8 +277,10 @@ class _Event:
                 # Another add-on may have removed it since the last evaluation.
                 apply_plan.apply_driver(obj, skinned.bound, new)
             skinned.needs_apply |= facts.calls_for_plan
-            versions = skinned.bound.data_versions
-            skinned.noted = replace(skinned.noted, mode=obj.mode, data_versions=versions)
+            noted, versions = skinned.noted, skinned.bound.data_versions
+            skinned.noted = replace(
+                noted, layout=replace(noted.layout, mode=obj.mode), data_versions=versions
+            )
         skinned.plan = new
         if new.is_in_depsgraph:
             if new.in_buffer:
@@ -398,7 +400,7 @@ def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
     # The plan depends on settings such as Preserve Volume as the artist set them.
     attach.restore_volume(obj)
     attach.follow_stack(obj)
-    attach.check_behind(obj)
+    attach.check_behind(obj, layout.read(obj))
     attach.adopt_pointers(obj)
     armatures = properties.of(obj).armatures
     if not armatures:

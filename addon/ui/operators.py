@@ -8,6 +8,7 @@ import bpy
 
 from ..attach import attach, corrective_smooth, properties, stack, stage_settings
 from ..attach.feature import Feature
+from ..attach.layout import parent_deforms
 from ..attach.stage_settings import method_items
 from ..attach.updates import is_rendering_in_window, updates_suspended
 from ..base.errors import SinewError
@@ -64,8 +65,7 @@ def _each_target(context: bpy.types.Context) -> Iterator[bpy.types.Object]:
 
 def _is_of(obj: bpy.types.Object, meant: Collection[bpy.types.Object]) -> bool:
     """Whether one of the armatures deforms a mesh; for most meshes of a scene this is decided at once."""
-    has_modifier = any(modifier.type == "ARMATURE" for modifier in obj.modifiers)
-    if not (has_modifier or stack.parent_deforms(obj) or properties.has_sinew(obj)):
+    if not (stack.has_armature_modifier(obj) or parent_deforms(obj) or properties.has_sinew(obj)):
         return False
     return attach.armature_of(obj) in meant and bool(attach.deformed_meshes([obj]))
 

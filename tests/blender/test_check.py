@@ -91,17 +91,6 @@ def test_what_sinew_can_not_drive(wanted, tmp_path):
     assert all(problem.startswith("Arm") for problem in report["problems"])
 
 
-def test_an_armature_modifier_that_was_left_off(tmp_path):
-    """The state of a file that lost Sinew's settings: object and modifier are otherwise complete."""
-    obj, _armature = scenes.skinned_arm("dq")
-    attach.remove(obj)
-    modifier = obj.modifiers["Armature"]
-    assert "ok" in run_sinew("check", scenes.save(tmp_path / "a.blend")).stdout
-    modifier.object, modifier.show_viewport, modifier.show_render = None, False, False
-    (problem,) = check(scenes.save(tmp_path / "b.blend"), status=1)["b.blend"]["problems"]
-    assert "Armature is switched off and has no armature" in problem
-
-
 def test_what_is_hidden_in_another_scene(tmp_path):
     """Such objects are checked as well."""
     obj, armature = scenes.skinned_arm("dq")

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 import scenes
 import sinew_addon
-from sinew_addon.attach import attach, properties, stack
+from sinew_addon.attach import attach, layout, properties, stack
 from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.deform import in_depsgraph, safe_mode, session
 from sinew_addon.deform.plan import State
@@ -210,7 +210,7 @@ def test_another_armature_modifier_in_the_place_of_one_that_is_gone(arm, gone):
     act(modifier="Armature")
     bpy.context.view_layer.update()
     assert "deleted or applied; add another and press Rebind, or Remove" in session.plan_of(arm).reason
-    assert not any(stack.is_on(modifier) for modifier in arm.modifiers)
+    assert not any(m.is_on for m in layout.read(arm).modifiers)
     another = arm.modifiers.new("Another", "ARMATURE")
     another.object, another.use_deform_preserve_volume = armature, True
     bpy.context.scene.frame_set(8)

@@ -15,7 +15,7 @@ import routes
 import scenes
 import sinew
 import sinew_addon
-from sinew_addon.attach import attach, other_tools, properties, stack, stage_settings, undeformed
+from sinew_addon.attach import attach, layout, other_tools, properties, stack, stage_settings, undeformed
 from sinew_addon.attach.subscribers import notify, subscribers
 from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import handlers, precompute_watch, safe_mode, session, small_meshes
@@ -174,7 +174,7 @@ class SinewSide(Side):
                 raise ValueError(f"{obj.name}: {'a' if is_warned else 'no'} warning about {modifier.name}")
 
     def check_refused(self, obj: bpy.types.Object, modifier: bpy.types.Modifier) -> None:
-        if modifier not in stack.downstream(obj) or not obj.visible_get():
+        if modifier.name not in {each.name for each in layout.read(obj).behind} or not obj.visible_get():
             return
         if self.has_sinew(obj):
             if not obj.sinew.enabled:

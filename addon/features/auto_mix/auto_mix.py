@@ -9,9 +9,9 @@ import bpy
 import numpy as np
 from mathutils.kdtree import KDTree
 
-from ...attach import properties, stage_settings
+from ...attach import group_uses, properties, stage_settings
 from ...base.errors import SinewError
-from ...deform import group_uses, session
+from ...deform import session
 from ...io import mesh_io
 from ...skinning.vectors import transformed
 from ...ui import stepped

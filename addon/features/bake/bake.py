@@ -83,7 +83,7 @@ class Cache:
 
     def place(self) -> None:
         obj = self.obj
-        place, nodes = list(obj.modifiers).index(stack.armature_modifier(obj)), stack.sinew_modifier(obj)
+        nodes, place = stack.sinew_modifier(obj), obj.modifiers.find(stack.armature_modifier(obj).name)
         shown = nodes.show_viewport, nodes.show_render
         _take_off(obj)
         modifier = obj.modifiers.new("Sinew Cache", "MESH_CACHE")

@@ -224,8 +224,7 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     smooth = replaced.name if replaced is not None else None
     _use_own_actions(copy)
     _take_sinew_off(copy)
-    for modifier in [m for m in copy.modifiers if m.type in LEFT_OUT]:
-        copy.modifiers.remove(modifier)
+    stack.remove_types(copy, LEFT_OUT)
     if copy.field is not None:
         copy.field.type = "NONE"
     copy.hide_select = True

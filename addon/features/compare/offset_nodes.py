@@ -7,34 +7,22 @@ import functools
 import bpy
 import numpy as np
 
-from ...attach import node_group
+from ...attach import node_group, stack
 
 # A custom property on the group, by which a renamed group is recognised.
 MARK = "sinew_offset"
 
 
 def find(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    return next((m for m in obj.modifiers if m.type == "NODES" and _is_ours(m.node_group)), None)
+    return stack.of_nodes(obj, _is_ours)
 
 
 def add(obj: bpy.types.Object) -> None:
     """Adds the modifier behind all others except a Subdivision at the end: its result is the same, and only
     at the end Blender subdivides on the graphics card."""
-    last = _last_place(obj)
-    behind = list(obj.modifiers)[last:]
-    modifier = obj.modifiers.new("Offset", "NODES")
+    modifier = stack.add_last_but(obj, "SUBSURF", "Offset", "NODES")
     modifier.node_group = next((g for g in bpy.data.node_groups if _is_ours(g)), None) or _make()
     modifier.show_expanded = False
-    # Pinned modifiers are behind all others.
-    modifier.use_pin_to_last = all(m.use_pin_to_last for m in behind)
-    obj.modifiers.move(list(obj.modifiers).index(modifier), last)
-
-
-def _last_place(obj: bpy.types.Object) -> int:
-    modifiers = list(obj.modifiers)
-    while modifiers and modifiers[-1].type == "SUBSURF":
-        modifiers.pop()
-    return len(modifiers)
 
 
 def set_offset(obj: bpy.types.Object, offset: tuple[float, float, float]) -> None:

@@ -6,8 +6,9 @@ from collections.abc import Iterator
 
 import bpy
 
-from ...attach import attach, stack
+from ...attach import attach
 from ...attach.feature import Feature
+from ...attach.layout import read as read_stack
 from ...base.errors import SinewError
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, characters, draw_text, names_text, shortened
@@ -153,7 +154,7 @@ def _draw_check(layout: bpy.types.UILayout, obj: bpy.types.Object, found: diagno
     if not found.findings:
         column.label(text="Nothing found", icon="CHECKMARK")
     draw_text(column, "Checked: weights, {poses}", poses=found.frames)
-    upstream = [modifier.name for modifier in stack.upstream_changes(obj)]
+    upstream = [modifier.name for modifier in read_stack(obj).changes_ahead]
     if upstream:
         names = ", ".join(upstream)
         what = "What {names} in front makes of the mesh is not checked: it has no vertices to select"

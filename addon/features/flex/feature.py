@@ -9,8 +9,9 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...attach import properties, stack
+from ...attach import properties
 from ...attach.feature import Feature
+from ...attach.layout import read as read_stack
 from ...attach.subscribers import subscribers
 from ...base.errors import SinewError
 from ...ui import operators, stepped
@@ -84,7 +85,7 @@ class SINEW_OT_flex_place(_OnFinding, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         _result, _joint, finding = self.found(context)
         obj = context.scene.objects.get(finding.mesh)
-        if obj is None or finding.vertex >= len(obj.data.vertices) or stack.upstream_changes(obj):
+        if obj is None or finding.vertex >= len(obj.data.vertices) or read_stack(obj).changes_ahead:
             raise SinewError(f"{finding.mesh} has other vertices than those that were bent")
         if not obj.data.is_editable:
             raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")

@@ -13,7 +13,8 @@ from typing import Self
 import bpy
 import numpy as np
 
-from ...attach import attach, corrective_smooth, properties, stage_settings, upstream_proxy
+from ...attach import corrective_smooth, properties, stack, stage_settings, upstream_proxy
+from ...attach.layout import method_of
 from ...base.errors import SinewError
 from ...deform import pose, session
 from ...deform.bound import Bound
@@ -340,7 +341,7 @@ def _modifiers_methods(obj: bpy.types.Object, other: str) -> tuple[str, ...]:
     """Returns the methods of the Armature modifiers themselves, if `other` is Blender."""
     if other != properties.BLENDER:
         return ()
-    return tuple(attach.method_of(modifier) for modifier, _kept in attach.replaced_modifiers(obj))
+    return tuple(method_of(modifier) for modifier in stack.armature_modifiers(obj))
 
 
 def _shape_of(inputs: Sequence[_Inputs], worlds: Sequence[np.ndarray]) -> np.ndarray:

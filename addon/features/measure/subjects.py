@@ -15,10 +15,10 @@ from typing import Self
 import bpy
 import numpy as np
 
-from ...attach import attach, stack
+from ...attach import attach, group_uses, layout, stack
 from ...attach.modifier_options import ModifierOptions
 from ...base.errors import SinewError
-from ...deform import characters, group_uses, session
+from ...deform import characters, session
 from ...io import armature_io, mesh_io, spaces
 from ...skinning.influences import GroupWeights, Influences, entries_of_bones
 from ...skinning.influences import joined as influences_of_all
@@ -187,8 +187,9 @@ def skinning_alone(meshes: Sequence[bpy.types.Object]) -> Iterator[None]:
     """Context in which modifiers behind the skinning are switched off."""
     hidden = []
     for obj in meshes:
-        kept = [*stack.upstream(obj), *stack.armature_modifiers(obj), *stack.own_modifiers(obj)]
-        hidden += [m for m in obj.modifiers if m not in kept and m.show_viewport]
+        now = layout.read(obj)
+        kept = {*now.replaced, *now.own, *(each.name for each in now.ahead)}
+        hidden += [obj.modifiers[m.name] for m in now.modifiers if m.name not in kept and m.shown[0]]
     for modifier in hidden:
         modifier.show_viewport = False
     try:
@@ -284,7 +285,7 @@ def _read_part(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Part:
     armature, edited = attach.armature_of(obj), Edited.read(obj, depsgraph)
     weighting, points = edited.weighting, edited.rest_points
     shown = obj.evaluated_get(depsgraph)
-    if stack.upstream_changes(obj):
+    if layout.read(obj).changes_ahead:
         weighting = _weighting(obj, shown, mesh_io.read_group_weights(shown.data), weighting.bones)
         points = _in_armature_space(obj, armature, shown.data, depsgraph)
     influences = weighting.influences_over_joints(points)

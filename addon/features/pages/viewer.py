@@ -11,6 +11,7 @@ import bpy
 import numpy as np
 
 from ...attach import attach, properties, stage_settings, upstream_proxy
+from ...attach.layout import method_of
 from ...base.errors import SinewError
 from ...deform import characters, session, source
 from ...deform.bound import Bound
@@ -248,7 +249,7 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         triangles,
         its_source.topology.edges,
         weighting.bones.rest_axes,
-        attach.method_of(modifier),
+        method_of(modifier),
         centres,
         mix,
         by_hierarchy,

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import bpy
 
-from ...attach import attach, other_tools, properties, stack, upstream_proxy
+from ...attach import attach, layout, other_tools, properties, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...base.errors import SinewError
 from ...deform import characters, session
@@ -33,7 +33,9 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     # Read before they are tried, which switches them on.
     enabled = [obj for obj in skinned if properties.of(obj).enabled]
     meshes = [
-        {"object": obj.name, "method": properties.of(obj).method} for obj in enabled if attach.deforms(obj)
+        {"object": obj.name, "method": properties.of(obj).method}
+        for obj in enabled
+        if layout.read(obj).deforms
     ]
     off = [obj.name for obj in skinned if obj not in enabled]
     told = [
@@ -87,7 +89,8 @@ def _obstacle(obj: bpy.types.Object) -> str | None:
     gone = [replaced.name for replaced in properties.of(obj).replaced_modifiers if replaced.armature is None]
     if gone and attach.armature_of(obj) is None:
         return f"{obj.name}: the armature of {', '.join(gone)} is gone; choose another one, or Remove Sinew"
-    if stack.armature_modifier(obj) is None:
+    now = layout.read(obj)
+    if not now.replaced:
         return (
             f"{obj.name}: the Armature modifier that Sinew stands in for is gone; Remove Sinew, or add the "
             "modifier anew"
@@ -101,7 +104,7 @@ def _obstacle(obj: bpy.types.Object) -> str | None:
         library = obj.override_library.reference.library.filepath
         return f"{obj.name} overrides what is in {library}, which is missing; put the file there"
     try:
-        upstream_proxy.check(obj)
+        upstream_proxy.check(obj, now)
     except SinewError as error:
         return str(error)
     return None
@@ -111,14 +114,9 @@ def _remains(obj: bpy.types.Object) -> Iterator[str]:
     """Yields remains of Sinew on an object without its settings."""
     if obj.type != "MESH" or properties.is_helper(obj):
         return
-    if stack.sinew_modifier(obj) is not None:
+    own = layout.read(obj).sinew
+    if own:
         yield (
-            f"{obj.name}: has the modifier {stack.sinew_modifier(obj).name} of Sinew without its settings, "
-            "and keeps one shape; delete that modifier and add Sinew again"
+            f"{obj.name}: has the modifier {own} of Sinew without its settings, and keeps one shape; delete "
+            "that modifier and add Sinew again"
         )
-    for modifier in obj.modifiers:
-        if modifier.type == "ARMATURE" and modifier.object is None and not stack.is_on(modifier):
-            yield (
-                f"{obj.name}: its modifier {modifier.name} is switched off and has no armature, as Sinew "
-                "leaves one that it stands in for; choose the armature and switch it on, or delete it"
-            )

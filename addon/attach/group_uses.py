@@ -7,7 +7,7 @@ from functools import partial
 
 import bpy
 
-from ..attach import properties, stack, stage_settings
+from . import layout, properties, stage_settings
 
 
 def used(obj: bpy.types.Object, names: Collection[str], but: str = "") -> set[str]:
@@ -25,10 +25,10 @@ def used(obj: bpy.types.Object, names: Collection[str], but: str = "") -> set[st
 
 
 def _in_modifiers(obj: bpy.types.Object) -> Iterator[str]:
-    neutral = stack.neutral_modifier(obj)
+    neutral = layout.read(obj).neutral
     for modifier in obj.modifiers:
         # Any group does for it.
-        if modifier == neutral:
+        if modifier.name == neutral:
             continue
         yield from _texts(modifier)
         if modifier.type == "NODES" and not hasattr(modifier, "properties"):  # before Blender 5.2
