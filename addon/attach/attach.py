@@ -18,6 +18,7 @@ from . import (
     baked,
     corrective_smooth,
     layout,
+    modifier_types,
     point_store,
     pose_driver,
     properties,
@@ -31,7 +32,6 @@ from . import (
 )
 from .icons import VIEWS, Deformer
 from .layout import Layout, method_of
-from .modifier_types import NEED_ORIGINAL_MESH
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -108,7 +108,7 @@ def check_stack(obj: bpy.types.Object, left_out: Collection[str] = ()) -> None:
 def check_behind(obj: bpy.types.Object, now: Layout, left_out: Collection[str] = ()) -> None:
     """Raises SinewError where a modifier behind, without types of `left_out`, does not permit Sinew's."""
     for modifier in now.behind:
-        if modifier.kind in NEED_ORIGINAL_MESH.difference(left_out):
+        if modifier.kind in modifier_types.NEED_ORIGINAL_MESH.difference(left_out):
             raise SinewError(
                 f"{obj.name}: in front of {modifier.name} Blender permits only modifiers that just deform, "
                 "so not Sinew's; move it in front of the Armature modifier, or apply or remove it"
@@ -291,35 +291,33 @@ def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
 
     in_depsgraph  Sinew deforms it within Blender's evaluation
     """
-    settings, nodes = properties.of(obj), sinew_modifier(obj)
-    was_on = settings.replaces_modifiers
+    settings, now = properties.of(obj), layout.read(obj)
+    was_on, nodes = settings.replaces_modifiers, obj.modifiers.get(now.sinew)
     if on:
         restore_volume(obj)
-        adopt_pointers(obj)
+        adopt_pointers(obj, now)
     elif was_on:
-        restore_builtin(obj)
+        restore_pointers(obj, now)
+        pose_driver.remove(obj)
     if nodes is not None:
         # In edit mode the Armature modifiers deform.
         _set_icon(nodes, "show_in_editmode", False)
-    for name in VIEWS:
-        _switch_own(obj, nodes, f"show_{name}", on, was_on, in_depsgraph)
+    for view in range(len(VIEWS)):
+        _switch_own(obj, now, view, on, was_on, in_depsgraph)
     undeformed.mark(obj, on)
     property_groups.store(settings.stack, "replaces_modifiers", on)
-    smooths = (not on or icons.deformer is Deformer.ARMATURE for icons in layout.read(obj).icons)
-    corrective_smooth.switch(obj, *smooths)
+    if settings.before.smooth.name:
+        smooths = (not on or icons.deformer is Deformer.ARMATURE for icons in layout.read(obj).icons)
+        corrective_smooth.switch(obj, *smooths)
 
 
 def _switch_own(
-    obj: bpy.types.Object,
-    nodes: bpy.types.NodesModifier | None,
-    icon: str,
-    on: bool,
-    was_on: bool,
-    in_depsgraph: bool,
+    obj: bpy.types.Object, now: Layout, view: int, on: bool, was_on: bool, in_depsgraph: bool
 ) -> None:
     """Switches an icon of Sinew's modifiers, unless an animation does."""
     known, is_shown, is_clicked = properties.of(obj).stack, on, on != was_on
-    if nodes is not None and not is_animated(obj, nodes, icon):
+    icon, nodes = f"show_{VIEWS[view]}", obj.modifiers.get(now.sinew)
+    if nodes is not None and not now.by_name[now.sinew].keyed[view]:
         if was_on:
             is_clicked |= getattr(known, icon) != getattr(nodes, icon)
             property_groups.store(known, icon, getattr(nodes, icon))
@@ -327,7 +325,7 @@ def _switch_own(
         _set_icon(nodes, icon, is_shown)
     # Within the evaluation, in_depsgraph.py switches them: a click evaluates the object once.
     is_clicked |= not is_shown
-    undeformed.switch(obj, icon, on if in_depsgraph else is_shown, is_clicked)
+    undeformed.switch(obj, now, icon, on if in_depsgraph else is_shown, is_clicked)
 
 
 def is_off(obj: bpy.types.Object) -> bool:
@@ -336,15 +334,19 @@ def is_off(obj: bpy.types.Object) -> bool:
     return not (settings.enabled or settings.replaces_modifiers)
 
 
-def follow_own_icons(obj: bpy.types.Object) -> None:
-    """Takes over that the artist switched Sinew's modifier on where a small mesh is left to Blender."""
-    settings, nodes = properties.of(obj), sinew_modifier(obj)
-    if settings.replaces_modifiers or nodes is None or obj.mode in ("EDIT", "SCULPT"):
-        return
-    for name in VIEWS:
-        if getattr(nodes, f"show_{name}") and not is_animated(obj, nodes, f"show_{name}"):
+def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
+    """Takes over that the artist switched Sinew's modifier on where a small mesh is left to Blender. Returns
+    whether it was."""
+    settings, is_switched = properties.of(obj), False
+    if settings.replaces_modifiers or not now.sinew or obj.mode in ("EDIT", "SCULPT"):
+        return False
+    nodes = now.by_name[now.sinew]
+    for name, is_shown, is_keyed in zip(VIEWS, nodes.shown, nodes.keyed, strict=True):
+        if is_shown and not is_keyed:
             property_groups.store(settings, "leave_small", False)
             property_groups.store(settings.stack, f"show_{name}", True)
+            is_switched = True
+    return is_switched
 
 
 def show(obj: bpy.types.Object) -> None:
@@ -386,17 +388,19 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
     property_groups.store(settings.before, "has_nearest_volume", True)
 
 
-def restore_volume(obj: bpy.types.Object) -> None:
-    """Gives the Armature modifiers the artist's own Preserve Volume again."""
+def restore_volume(obj: bpy.types.Object) -> bool:
+    """Gives the Armature modifiers the artist's own Preserve Volume again. Returns whether they had another
+    one."""
     settings = properties.of(obj)
     if not settings.before.has_nearest_volume:
-        return
+        return False
     for replaced in settings.replaced_modifiers:
         modifier = stack.modifier_of(obj, replaced)
         # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
             _preserve_volume(modifier, replaced.preserve_volume)
     property_groups.store(settings.before, "has_nearest_volume", False)
+    return True
 
 
 def has_switched_volume(obj: bpy.types.Object) -> bool:
@@ -453,16 +457,16 @@ def replaced_modifiers(obj: bpy.types.Object, now: Layout | None = None) -> Repl
     return pairs
 
 
-def follow_stack(obj: bpy.types.Object) -> None:
+def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
     """Follows the artist's changes of the stack, where modifiers were moved, renamed or deleted. Each
     Armature modifier keeps its method; one that no longer follows the first without a gap deforms by itself
-    again."""
+    again. Returns the layout now."""
     settings = properties.of(obj)
-    stack.position_own(obj)
+    now = stack.position_own(obj, now)
     kept = settings.replaced_modifiers
-    names = [replaced.name for _modifier, replaced in replaced_modifiers(obj)]
+    names = [replaced.name for _modifier, replaced in replaced_modifiers(obj, now)]
     if [replaced.name for replaced in kept] == names:
-        return
+        return now
     methods = _methods(settings)
     for name in methods.keys() - set(names):
         modifier = obj.modifiers.get(name)
@@ -476,6 +480,7 @@ def follow_stack(obj: bpy.types.Object) -> None:
     for name, method in _methods(settings).items():
         if method != methods[name]:
             kept[name].method = methods[name]
+    return layout.read(obj)
 
 
 def _methods(settings: properties.SinewSettings) -> dict[str, str]:
@@ -486,17 +491,17 @@ def _methods(settings: properties.SinewSettings) -> dict[str, str]:
     }
 
 
-def adopt_pointers(obj: bpy.types.Object) -> None:
+def adopt_pointers(obj: bpy.types.Object, now: Layout) -> None:
     """Takes over armatures that the artist chose in the Armature modifiers."""
-    for modifier, replaced in replaced_modifiers(obj):
+    for modifier, replaced in replaced_modifiers(obj, now):
         # An undo can have the object in its own modifier (point_store.clear_references_to_itself).
         if modifier.object not in (None, obj, replaced.armature):
             replaced.armature = modifier.object
 
 
-def restore_pointers(obj: bpy.types.Object) -> None:
+def restore_pointers(obj: bpy.types.Object, now: Layout) -> None:
     """Makes the Armature modifiers point to their armatures again."""
-    for modifier, replaced in replaced_modifiers(obj):
+    for modifier, replaced in replaced_modifiers(obj, now):
         _restore_pointer(modifier, replaced)
 
 
@@ -514,9 +519,3 @@ def is_deleted(armature: bpy.types.Object) -> bool:
     """Whether the user deleted it: it is then in no collection, and only Sinew's pointer keeps it in the
     file."""
     return armature.library is None and not armature.users_collection
-
-
-def restore_builtin(obj: bpy.types.Object) -> None:
-    """Makes the Armature modifiers point to their armatures again, and removes Sinew's driver."""
-    restore_pointers(obj)
-    pose_driver.remove(obj)

@@ -17,7 +17,7 @@ from dataclasses import dataclass
 
 import bpy
 
-from . import node_group, properties, property_groups, references, stack
+from . import node_group, properties, property_groups, references
 
 PATH = "sinew.driver.pose"
 # The properties that the last two variables read.
@@ -48,18 +48,19 @@ class _Variable:
         target.data_path = self.path
 
 
-def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]], in_depsgraph: bool) -> None:
+def ensure(obj: bpy.types.Object, poses: Sequence[tuple[bpy.types.Object, str]], requests: str) -> None:
     """Makes the driver, or makes it again where it is not as it has to be.
 
     poses         armatures, each with the path of a property that Blender reads only after its bones are
                   posed. Blender evaluates these bones, their parents and their constraints' targets, and no
                   others.
-    in_depsgraph  the driver requests the points, after the point buffer and the upstream proxy are evaluated
+    requests      the name of Sinew's modifier where the driver requests the points, after the point buffer
+                  and the upstream proxy are evaluated; else empty
     """
     variables = [_Variable(armature, path) for armature, path in poses]
     path = PATH
-    if in_depsgraph:
-        path = node_group.input_path(stack.sinew_modifier(obj), node_group.POSE)
+    if requests:
+        path = node_group.input_path(obj.modifiers[requests], node_group.POSE)
         armatures = dict.fromkeys(armature for armature, _path in poses)
         # Read through a property, as Blender does not wait for the driver's own object in transform
         # variables.

@@ -6,8 +6,8 @@ from collections.abc import Callable, Collection
 
 import bpy
 
-from . import layout, properties
-from .modifier_types import NEED_ORIGINAL_MESH
+from . import layout, modifier_types, properties
+from .layout import Layout
 
 
 def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
@@ -56,22 +56,23 @@ def modifier_of(
     return None if number is None else obj.modifiers[number]
 
 
-def position_own(obj: bpy.types.Object) -> None:
+def position_own(obj: bpy.types.Object, now: Layout) -> Layout:
     """Moves Sinew's modifiers behind the Armature modifiers that it replaces: it sets each vertex to its
     point regardless of the modifiers before it. In front of them or between them, even one that is off would
-    decide what a Multi Modifier mixes with."""
-    now = layout.read(obj)
-    if any(modifier.kind in NEED_ORIGINAL_MESH for modifier in now.behind):
-        return
-    for ahead, name in itertools.pairwise([now.replaced[-1], *now.own] if now.replaced else []):
-        move_behind(obj, name, ahead)
+    decide what a Multi Modifier mixes with. Returns the layout now."""
+    if any(modifier.kind in modifier_types.NEED_ORIGINAL_MESH for modifier in now.behind):
+        return now
+    pairs = itertools.pairwise([now.replaced[-1], *now.own] if now.replaced else [])
+    are_moved = [move_behind(obj, name, ahead) for ahead, name in pairs]
+    return layout.read(obj) if any(are_moved) else now
 
 
-def move_behind(obj: bpy.types.Object, name: str, other: str) -> None:
-    """Moves a modifier directly behind another one, where it is not there."""
+def move_behind(obj: bpy.types.Object, name: str, other: str) -> bool:
+    """Moves a modifier directly behind another one. Returns whether it was not there."""
     own, ahead = obj.modifiers.find(name), obj.modifiers.find(other)
     if own != ahead + 1:
         obj.modifiers.move(own, ahead if own < ahead else ahead + 1)
+    return own != ahead + 1
 
 
 def has_armature_modifier(obj: bpy.types.Object) -> bool:

@@ -33,11 +33,13 @@ _OTHER_MESHES = {
 
 def ensure(obj: bpy.types.Object) -> dict[str, object]:
     """Makes the modifiers around Sinew's, and returns inputs of Sinew's."""
-    if stack.neutral_modifier(obj) is None and _can_make(obj):
+    now = layout.read(obj)
+    if not now.neutral and _can_make(obj):
         _make_neutral(obj)
-    _ensure_mark(obj)
-    stack.position_own(obj)
-    can_mark = _can_mark(obj) and not loses_marks(obj, layout.read(obj))
+    _ensure_mark(obj, now)
+    if not (now.neutral and now.mark):
+        now = layout.read(obj)
+    can_mark = _can_mark(obj) and not loses_marks(obj, stack.position_own(obj, now))
     keeps = properties.of(obj).before.adds_rest_position or not can_mark
     return {
         node_group.IS_MARKED: can_mark,
@@ -96,8 +98,8 @@ def _make_neutral(obj: bpy.types.Object) -> None:
     properties.of(obj).stack.neutral_uid = neutral.persistent_uid
 
 
-def _ensure_mark(obj: bpy.types.Object) -> None:
-    mark = stack.mark_modifier(obj) or _new(obj, layout.MARK_NAME, "NODES")
+def _ensure_mark(obj: bpy.types.Object, now: layout.Layout) -> None:
+    mark = obj.modifiers.get(now.mark) or _new(obj, layout.MARK_NAME, "NODES")
     property_groups.store(properties.of(obj).stack, "mark_uid", mark.persistent_uid)
     group = node_group.get_or_make_stack_mark()
     if mark.node_group != group:
@@ -120,13 +122,13 @@ def _new(obj: bpy.types.Object, name: str, kind: str) -> bpy.types.Modifier:
 _switched: set[int] = set()
 
 
-def switch(obj: bpy.types.Object, icon: str, is_on: bool, is_clicked: bool) -> None:
+def switch(obj: bpy.types.Object, now: layout.Layout, icon: str, is_on: bool, is_clicked: bool) -> None:
     """Switches the helping modifiers on or off, and notes where somebody has switched one.
 
     icon        show_viewport or show_render
     is_clicked  Sinew's own modifier was switched, which they may follow
     """
-    for modifier in stack.helping_modifiers(obj):
+    for modifier in (obj.modifiers[name] for name in now.helping):
         # Setting an unchanged value makes Blender evaluate the object, too.
         if getattr(modifier, icon) != is_on:
             setattr(modifier, icon, is_on)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import bpy
 import numpy as np
 
-from ..attach import point_store, properties
+from ..attach import layout, point_store, properties
 from ..base.errors import SinewError
 from . import bound, pose, source
 from .changes import Changes
@@ -88,12 +88,13 @@ def bring_up_to_date(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: b
         return
     if not source.is_ready(obj, depsgraph):
         raise SinewError(f"{obj.name}: Blender has not evaluated what is in front of Sinew yet")
-    if skinned.noted.are_options_keyed and bound.is_of_other_modifiers(obj, skinned.bound, depsgraph):
-        skinned.bind(bound.read(obj, depsgraph))
+    now = layout.read(obj)
+    if skinned.noted.are_options_keyed and bound.is_of_other_modifiers(obj, now, skinned.bound, depsgraph):
+        skinned.bind(bound.read(obj, depsgraph, now))
     if skinned.needs_recheck:
         changes = Changes(meshes={obj.data.session_uid})
         if source.has_changed(obj, skinned.bound.source, depsgraph, changes, touched=False):
-            skinned.bind(bound.read(obj, depsgraph, skinned.bound))
+            skinned.bind(bound.read(obj, depsgraph, now, skinned.bound))
         skinned.needs_recheck = False
     with skinned.lock:
         shape(obj, skinned, depsgraph)

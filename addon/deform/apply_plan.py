@@ -20,6 +20,7 @@ from ..attach import (
     upstream_proxy,
 )
 from ..attach.icons import VIEWS, Deformer
+from ..attach.layout import Layout
 from ..base.errors import SinewError
 from ..io import armature_io
 from . import safe_mode, small_meshes
@@ -29,17 +30,17 @@ from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State
 log = logging.getLogger("sinew")
 
 
-def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
+def first_facts(obj: bpy.types.Object, now: Layout, error: str) -> ObjectFacts:
     """Returns the facts by which nothing of an object is read; others do not matter then.
 
+    now    its layout
     error  why Sinew can not deform it; empty where it can
     """
     settings, is_linked = properties.of(obj), obj.library is not None
     if attach.is_off(obj):
         return ObjectFacts(enabled=False)
-    if not is_linked:
-        attach.follow_own_icons(obj)
-    now = layout.read(obj)
+    if not is_linked and attach.follow_own_icons(obj, now):
+        now = layout.read(obj)
     viewport, render = now.icons
     is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
     return ObjectFacts(
@@ -57,19 +58,20 @@ def first_facts(obj: bpy.types.Object, error: str) -> ObjectFacts:
     )
 
 
-def all_facts(obj: bpy.types.Object, failure: str, waits_for: str) -> ObjectFacts:
+def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) -> ObjectFacts:
     """Returns all facts of an object that is read.
 
+    now        its layout
     failure    the error when Sinew deformed it within Blender's evaluation
     waits_for  what its method needs and is not computed yet
     """
-    settings, mesh, now = properties.of(obj), obj.data, layout.read(obj)
+    settings, mesh = properties.of(obj), obj.data
     gives_normals = normals.are_given(settings)
     domain = normals.domain_of(mesh) if gives_normals else ""
     obstacle = normals.obstacle(obj, now) if domain else ""
     given = normals.kind_of(mesh, "" if obstacle else domain)
     return replace(
-        first_facts(obj, error=""),
+        first_facts(obj, now, error=""),
         builtin_is_faster=small_meshes.is_builtin_faster(obj, now, given),
         upstream_changes_weights=upstream_proxy.changes_weights(now),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
@@ -98,11 +100,10 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         # While it is edited, what Sinew stores stays.
         is_off = attach.is_off(obj) and old.state is not State.EDITING
         if is_off or (wanted.state is State.REFUSED and is_same):
-            stack.position_own(obj)
+            stack.position_own(obj, layout.read(obj))
             return
         attach.switch(obj, on=False)
-        stack.position_own(obj)
-        attach.adopt_pointers(obj)
+        attach.adopt_pointers(obj, stack.position_own(obj, layout.read(obj)))
         if is_given_up:
             point_store.remove_point_attributes(obj)
             upstream_proxy.remove(obj)
@@ -117,23 +118,23 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
     given = wanted.normals
     point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
     attach.switch(obj, on=True, in_depsgraph=wanted.is_in_depsgraph)
-    attach.restore_pointers(obj)
+    attach.restore_pointers(obj, layout.read(obj))
 
 
-def apply_driver(obj: bpy.types.Object, bound: Bound, wanted: Plan) -> None:
+def apply_driver(obj: bpy.types.Object, now: Layout, bound: Bound, wanted: Plan) -> None:
     """Keeps the poses evaluated even where an armature is hidden, and has Blender request the points where
     the plan says so."""
     poses = [
         (replaced.armature, path)
         for (_modifier, replaced), skin in zip(
-            attach.replaced_modifiers(obj), bound.skin_stack.skins, strict=False
+            attach.replaced_modifiers(obj, now), bound.skin_stack.skins, strict=False
         )
         if replaced.armature is not None
         for path in armature_io.paths_to_wait_for(replaced.armature, skin.deformer.moving_bones)
         # One that moves no vertex collapses all of them where it has no size.
         or [pose_driver.WORLD_MATRIX]
     ]
-    pose_driver.ensure(obj, list(dict.fromkeys(poses)), wanted.is_in_depsgraph)
+    pose_driver.ensure(obj, list(dict.fromkeys(poses)), now.sinew if wanted.is_in_depsgraph else "")
 
 
 def apply_saved(obj: bpy.types.Object, plan: Plan) -> None:
@@ -162,15 +163,15 @@ def mode_of(obj: bpy.types.Object) -> str:
     return "EDIT" if obj.data.is_editmode else obj.mode
 
 
-def has_lost_modifier(obj: bpy.types.Object, plan: Plan) -> bool:
+def has_lost_modifier(obj: bpy.types.Object, now: Layout, plan: Plan) -> bool:
     """Whether Sinew's modifier is gone, or the Armature modifier that deforms in its place."""
     if obj.data.is_editmode:
         return False
-    if stack.sinew_modifier(obj) is None:
+    if not now.sinew:
         return True
     # Where Sinew deforms, or an error says that it is gone, the object stays.
     stays = properties.of(obj).replaces_modifiers or plan.state is State.REFUSED
-    return not stays and stack.armature_modifier(obj) is None
+    return not (stays or now.replaced)
 
 
 def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:
@@ -198,13 +199,13 @@ def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
 
     Returns whether there was such a modifier.
     """
-    nodes = stack.sinew_modifier(obj)
-    if nodes is None:
+    now = layout.read(obj)
+    if not now.sinew:
         return False
-    armatures = [modifier for modifier in obj.modifiers if modifier.type == "ARMATURE"]
-    origin = _origin_of(nodes, armatures)
-    for modifier in stack.own_modifiers(obj):
-        obj.modifiers.remove(modifier)
+    armatures = [obj.modifiers[m.name] for m in now.modifiers if m.armature is not None]
+    origin = _origin_of(obj.modifiers[now.sinew], armatures)
+    for name in now.own:
+        obj.modifiers.remove(obj.modifiers[name])
     kept = properties.of(origin).replaced_modifiers if origin is not None else {}
     for modifier in armatures:
         replaced = kept.get(modifier.name)

@@ -10,7 +10,8 @@ from dataclasses import dataclass, replace
 import bpy
 import numpy as np
 
-from ..attach import attach, layout, properties, stage_settings
+from ..attach import attach, properties, stage_settings
+from ..attach.layout import Layout
 from ..attach.modifier_options import ModifierOptions
 from ..attach.properties import METHODS
 from ..base.phrases import phrase
@@ -103,15 +104,18 @@ class Bound:
         return self.skin_stack.skins[0].deformer
 
 
-def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | None = None) -> Bound:
+def read(
+    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, now: Layout, old: Bound | None = None
+) -> Bound:
     """Reads the object. Binds again only what has changed; returns the same skin stack where nothing has.
 
+    now  the object's layout
     old  given where neither modifiers nor their options changed since
 
     Requires source.is_ready().
     """
     read_now = source.read(obj, depsgraph, needs_surface(obj))
-    pairs = attach.replaced_modifiers(obj)
+    pairs = attach.replaced_modifiers(obj, now)
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     groups = stage_settings.vertex_groups(properties.of(obj))
     if old is not None:
@@ -126,7 +130,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound | Non
             read_now.points = old.source.points
         old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skins))
         return replace(old, source=read_now)
-    options = _options_of(obj, depsgraph)
+    options = _options_of(obj, now, depsgraph)
     masks = _masks(read_now, groups)
     skins = []
     before = () if old is None else old.skin_stack.skins
@@ -175,23 +179,25 @@ def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
     return bound.source.triangles is None and needs_surface(obj)
 
 
-def is_of_other_modifiers(obj: bpy.types.Object, bound: Bound, depsgraph: bpy.types.Depsgraph) -> bool:
+def is_of_other_modifiers(
+    obj: bpy.types.Object, now: Layout, bound: Bound, depsgraph: bpy.types.Depsgraph
+) -> bool:
     """Whether it was bound to other armatures, options or vertex groups of stages."""
-    pairs = attach.replaced_modifiers(obj)
+    pairs = attach.replaced_modifiers(obj, now)
     return (
         bound.armatures != [uid(replaced.armature) for _modifier, replaced in pairs]
-        or bound.options != _options_of(obj, depsgraph)
+        or bound.options != _options_of(obj, now, depsgraph)
         or bound.groups != stage_settings.vertex_groups(properties.of(obj))
     )
 
 
-def _options_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[ModifierOptions]:
+def _options_of(obj: bpy.types.Object, now: Layout, depsgraph: bpy.types.Depsgraph) -> list[ModifierOptions]:
     """Returns those of each Armature modifier at this evaluation."""
     evaluated = obj.evaluated_get(depsgraph).modifiers
     return [
         # Of a hidden object, what the artist changes is not evaluated.
         skin.armature.options or ModifierOptions.read(evaluated.get(skin.name, obj.modifiers[skin.name]))
-        for skin in layout.read(obj).skins
+        for skin in now.skins
     ]
 
 
@@ -214,12 +220,18 @@ def _equals_but_for_points(
 
 def _has_same_limbs(before: Weighting, read_now: Source, space: np.ndarray | None) -> bool:
     """Whether the limbs of bones, some of which only their skin tells, are where they were."""
-    vectors, known = _with_skin(before, read_now, space).bones.limbs
-    return are_equal(vectors, before.bones.limbs.vectors) and are_equal(known, before.bones.limbs.known)
+    known = before.bones.limbs
+    if not known.by_skin.any():
+        return True
+    now = _with_skin(before, read_now, space).bones.limbs
+    return are_equal(now.vectors, known.vectors) and are_equal(now.known, known.known)
 
 
 def _with_skin(weighting: Weighting, read_now: Source, space: np.ndarray | None) -> Weighting:
-    return weighting.with_skin(None if space is None else transformed(read_now.surface_points, space))
+    """Transforms the points only where skin tells limbs."""
+    if space is None or not weighting.bones.limbs.by_skin.any():
+        return weighting
+    return weighting.with_skin(transformed(read_now.surface_points, space))
 
 
 def _bones_from_model(

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import pose_driver, properties, references, stack, undeformed, upstream_proxy
+from ..attach import layout, pose_driver, properties, references, stack, undeformed, upstream_proxy
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import (
     is_main_thread,
@@ -199,7 +199,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
         unread = []
         for obj, state in current.pairs:
             with contextlib.suppress(ReferenceError):
-                if not state.is_as_noted(obj):
+                if not state.is_as_noted(obj, layout.read(obj)):
                     # For example its modifiers, which decide who computes its normals.
                     new.objects.add(obj.session_uid)
                 if obj.data.name_full not in names:

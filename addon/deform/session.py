@@ -433,9 +433,10 @@ def _do_all_use_builtin() -> bool:
 def _update(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     old, known = plan_of(obj), state_of(obj)
     try:
-        if _follow_removal(obj, old, changes):
+        now = layout.read(obj) if _may_be_removed(obj, changes) else None
+        if now is not None and _follow_removal(obj, now, old):
             return
-        found = update(obj, old, known, depsgraph, changes)
+        found = update(obj, now, old, known, depsgraph, changes)
     except ReferenceError:
         # The object was deleted since the list was made.
         current.objects = None
@@ -474,16 +475,20 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
     return refused
 
 
-def _follow_removal(obj: bpy.types.Object, plan: Plan, changes: Changes) -> bool:
-    """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
+def _may_be_removed(obj: bpy.types.Object, changes: Changes) -> bool:
+    """Whether its stack has to be looked at for Sinew's modifier."""
     state = state_of(obj)
     are_listed = changes.structure or obj.session_uid in changes.objects or not changes.complete
     if not are_listed and (state is None or state.is_attached(obj)):
         return False
-    if not (obj.is_editable and may_change_file()):
+    return obj.is_editable and may_change_file()
+
+
+def _follow_removal(obj: bpy.types.Object, now: layout.Layout, plan: Plan) -> bool:
+    """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
+    if not apply_plan.has_lost_modifier(obj, now, plan):
         return False
-    if not apply_plan.has_lost_modifier(obj, plan):
-        return False
+    state = state_of(obj)
     # The last shape is computed only here, not at each pose.
     rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
     apply_plan.follow_removal(obj, rest, shown)

@@ -122,10 +122,9 @@ class Noted:
     volume: float
 
     @classmethod
-    def of(cls, obj: bpy.types.Object, plan: Plan, bound: Bound) -> Noted:
+    def of(cls, obj: bpy.types.Object, now: Layout, plan: Plan, bound: Bound) -> Noted:
         storage, mesh = properties.of(obj).storage, obj.data
         own = {obj.session_uid, mesh.session_uid, uid(mesh.shape_keys), uid(storage.upstream_proxy)}
-        now = layout.read(obj)
         return cls(
             name=obj.name,
             layout=now,
@@ -282,9 +281,11 @@ class SkinnedObject:
                 changed |= not changes.bones[armature.session_uid].equals(known)
         return changed
 
-    def is_as_noted(self, obj: bpy.types.Object) -> bool:
-        """Whether the object itself is as it was when the plan was applied."""
-        now = layout.read(obj)
+    def is_as_noted(self, obj: bpy.types.Object, now: Layout) -> bool:
+        """Whether the object itself is as it was when the plan was applied.
+
+        now  its layout
+        """
         if self.noted.layout != now or self.noted.groups != obj.vertex_groups.keys():
             return False
         if self.noted.state != _own_facts(obj, now):

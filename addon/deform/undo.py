@@ -11,6 +11,7 @@ import contextlib
 
 import bpy
 
+from ..attach import layout
 from .changes import Changes
 from .plan import State
 from .skinned_object import SkinnedObject
@@ -56,7 +57,7 @@ def is_known_after(
     """Whether this is still the known object with its shape. Called with the first evaluation after the
     step."""
     has_shape = state.was_deformed(obj, depsgraph) or state.noted.dependencies.isdisjoint(changes.touched)
-    return _is_shown(obj, depsgraph) and has_shape and state.is_as_noted(obj)
+    return _is_shown(obj, depsgraph) and has_shape and state.is_as_noted(obj, layout.read(obj))
 
 
 def _is_shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import bpy
 
 from ..attach import attach, layout, normals, point_store, properties, stack, stage_settings, upstream_proxy
+from ..attach.layout import Layout
 from ..attach.updates import may_change_file
 from ..base.errors import SinewError
 from ..io import armature_io
@@ -28,6 +29,7 @@ NOT_REQUESTED = "Blender did not request the points"
 
 def update(
     obj: bpy.types.Object,
+    now: Layout | None,
     old: Plan,
     skinned: SkinnedObject | None,
     depsgraph: bpy.types.Depsgraph,
@@ -35,13 +37,14 @@ def update(
 ) -> SkinnedObject | Plan:
     """Deforms an object, or has Blender do so with the next evaluation, if anything changed.
 
+    now      its layout; None where it was not read yet
     old      its plan until now
     skinned  what was read of it; None for nothing
 
     Returns what is known of it from now on; its plan where nothing is read. Raises SinewError with a sentence
     for the user where Sinew cannot deform it.
     """
-    event = _Event(obj, old, skinned, depsgraph, changes)
+    event = _Event(obj, now, old, skinned, depsgraph, changes)
     facts = event.observe()
     while (action := react(facts, event.known)) is not Action.NOTHING:
         facts = event.perform(action, facts)
@@ -53,6 +56,7 @@ class _Event:
     """What one event means for one object."""
 
     obj: bpy.types.Object
+    seen: Layout | None
     old: Plan
     skinned: SkinnedObject | None
     depsgraph: bpy.types.Depsgraph
@@ -67,6 +71,12 @@ class _Event:
         self.bound_before = None if self.skinned is None else self.skinned.bound
         self.was_on = properties.of(self.obj).replaces_modifiers
         self.error = _error_of(self.obj, self.old, self.skinned)
+
+    @property
+    def layout(self) -> Layout:
+        """The object's, read once, and again after the stack was changed."""
+        self.seen = self.seen or layout.read(self.obj)
+        return self.seen
 
     # --- Observing
 
@@ -137,7 +147,7 @@ class _Event:
         return self.is_copy_outdated
 
     def _has_other_modifiers(self, skinned: SkinnedObject) -> bool:
-        return bound.is_of_other_modifiers(self.obj, skinned.bound, self.depsgraph)
+        return bound.is_of_other_modifiers(self.obj, self.layout, skinned.bound, self.depsgraph)
 
     def _is_copy_known(self) -> bool:
         """Whether the copy was compared or made in this event. The mesh is listed by what Sinew has evaluated
@@ -174,7 +184,7 @@ class _Event:
         obj, depsgraph = self.obj, self.depsgraph
         if not skinned.plan.is_in_depsgraph or skinned.evaluation.mesh:
             return False
-        is_known = not skinned.needs_recheck and skinned.is_as_noted(obj)
+        is_known = not skinned.needs_recheck and skinned.is_as_noted(obj, self.layout)
         is_hidden = depsgraph.mode == "VIEWPORT" and not obj.visible_get(view_layer=depsgraph.view_layer)
         if not is_known or is_hidden or not obj.evaluated_get(depsgraph).is_evaluated:
             return False
@@ -203,7 +213,7 @@ class _Event:
         if is_mesh_touched and normals.domain_of(obj.data) != skinned.noted.normals_domain:
             return True
         is_reshaped = skinned.plan.uses_builtin and not skinned.was_deformed(obj, self.depsgraph)
-        return is_reshaped or not skinned.is_as_noted(obj)
+        return is_reshaped or not skinned.is_as_noted(obj, self.layout)
 
     def _have_bones_changed(self) -> bool:
         # While it was off, changes were not recorded.
@@ -228,15 +238,16 @@ class _Event:
     def _replan(self, facts: Facts) -> None:
         if self.skinned is not None:
             _count_failures(self.obj, self.skinned, facts)
-        new = plan(apply_plan.first_facts(self.obj, self.error))
+        new = plan(apply_plan.first_facts(self.obj, self.layout, self.error))
         if new.is_read:
-            _check_modifiers(self.obj, self.changes)
+            self.seen = _check_modifiers(self.obj, self.layout, self.changes)
             new = self._full_plan()
         if not (new.uses_builtin or self._is_copy_known()):
             self.is_copy_outdated = not upstream_proxy.is_current(self.obj)
         if self.is_copy_outdated:
             upstream_proxy.set_outdated(self.obj)
         apply_plan.apply(self.obj, self.old, new)
+        self.seen = None
         self.known = replace(self.known, plan=new, is_planned=True)
 
     def _full_plan(self) -> Plan:
@@ -244,18 +255,18 @@ class _Event:
         if self.skinned is not None and self.skinned.evaluation.failures_in_a_row > MAX_FAILURES_IN_A_ROW:
             failure = self.skinned.evaluation.failure
         waits_for = precomputing.waits_for(self.obj, self.skinned)
-        return plan(apply_plan.all_facts(self.obj, failure, waits_for))
+        return plan(apply_plan.all_facts(self.obj, self.layout, failure, waits_for))
 
     def _read(self, facts: Facts, is_whole: bool) -> None:
         obj, skinned, depsgraph = self.obj, self.skinned, self.depsgraph
         if skinned is None:
-            read = bound.read(obj, depsgraph)
-            noted = Noted.of(obj, self.known.plan, read)
+            read = bound.read(obj, depsgraph, self.layout)
+            noted = Noted.of(obj, self.layout, self.known.plan, read)
             self.skinned = SkinnedObject(read, noted, self.known.plan, needs_apply=True)
         elif is_whole:
-            skinned.bind(bound.read(obj, depsgraph))
+            skinned.bind(bound.read(obj, depsgraph, self.layout))
         elif facts.have_bones_changed or facts.has_other_mesh:
-            skinned.bind(bound.read(obj, depsgraph, skinned.bound))
+            skinned.bind(bound.read(obj, depsgraph, self.layout, skinned.bound))
         else:
             skinned.bind(bound.with_surface(obj, depsgraph, skinned.bound))
         self.known = replace(self.known, is_bound=True, is_read=True)
@@ -275,7 +286,7 @@ class _Event:
         else:
             if known.is_read and new.is_in_depsgraph:
                 # Another add-on may have removed it since the last evaluation.
-                apply_plan.apply_driver(obj, skinned.bound, new)
+                apply_plan.apply_driver(obj, self.layout, skinned.bound, new)
             skinned.needs_apply |= facts.calls_for_plan
             noted, versions = skinned.noted, skinned.bound.data_versions
             skinned.noted = replace(
@@ -307,10 +318,12 @@ class _Event:
         """Notes that the plan was applied, and the state of the object it was applied to."""
         obj, skinned = self.obj, self.skinned
         if not new.uses_builtin:
-            apply_plan.apply_driver(obj, skinned.bound, new)
+            apply_plan.apply_driver(obj, self.layout, skinned.bound, new)
+            # A driver can count as an animation of the stack.
+            self.seen = None
             skinned.evaluation.is_only_user = True
         # After Sinew's driver is added, as the driver counts as animation, too.
-        skinned.noted = Noted.of(obj, new, skinned.bound)
+        skinned.noted = Noted.of(obj, self.layout, new, skinned.bound)
         skinned.needs_apply, skinned.evaluation.was_tagged = False, True
         if self.changes.frame and self.depsgraph.mode == "RENDER":
             # Applying the plan can have Blender copy the object again: what the frame has set is set again.
@@ -387,21 +400,23 @@ def _count_failures(obj: bpy.types.Object, skinned: SkinnedObject, facts: Facts)
         )
 
 
-def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
-    """Brings what Sinew stores about the modifiers in line with what the artist did to them.
+def _check_modifiers(obj: bpy.types.Object, now: Layout, changes: Changes) -> Layout:
+    """Brings what Sinew stores about the modifiers in line with what the artist did to them. Returns the
+    layout after that.
 
     Raises SinewError where those that Sinew works with are gone.
     """
-    if stack.armature_modifier(obj) is None:
+    if not now.replaced:
         raise SinewError(
             f"{obj.name}: its Armature modifier was deleted or applied; add another and press Rebind, or "
             "Remove"
         )
     # The plan depends on settings such as Preserve Volume as the artist set them.
-    attach.restore_volume(obj)
-    attach.follow_stack(obj)
-    attach.check_behind(obj, layout.read(obj))
-    attach.adopt_pointers(obj)
+    if attach.restore_volume(obj):
+        now = layout.read(obj)
+    now = attach.follow_stack(obj, now)
+    attach.check_behind(obj, now)
+    attach.adopt_pointers(obj, now)
     armatures = properties.of(obj).armatures
     if not armatures:
         raise SinewError(
@@ -414,3 +429,4 @@ def _check_modifiers(obj: bpy.types.Object, changes: Changes) -> None:
                 f"{obj.name}: its armature {armature.name} was deleted, or is in no collection; choose "
                 "another in the Armature modifier and press Rebind, or Remove"
             )
+    return now

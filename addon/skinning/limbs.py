@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, NamedTuple
 import numpy as np
 
 from ..base.names import MADE_BONES
-from .influences import Influences, owners_of
+from .influences import Influences
 
 if TYPE_CHECKING:
     from .rig import Bones
@@ -44,16 +44,18 @@ def words_of(name: str) -> str:
     return re.sub(r"(?<=[a-z])(?=[A-Z])", "_", name).lower()
 
 
-def skin_of(influences: Influences, points: np.ndarray, bones: int) -> np.ndarray:
+def skin_of(influences: Influences, points: np.ndarray, wanted: np.ndarray) -> np.ndarray:
     """Returns float64 [bones, 5], sums over the vertices that each bone moves, by weight: of their points, of
-    the squares of these, of 1. Those of several meshes may be added.
+    the squares of these, of 1. Those of several meshes may be added. 0 for bones that are not wanted.
 
     points  [vertices, 3], armature space
+    wanted  bool [bones]
     """
-    owners = owners_of(influences.counts)
-    of = points[owners].astype(np.float64)
-    values = np.column_stack([of, (of * of).sum(axis=1), np.ones(len(of))])
-    sums = [np.bincount(influences.bones, influences.weights * each, bones) for each in values.T]
+    taken = np.flatnonzero(wanted[influences.bones])
+    bones, weights = influences.bones[taken], influences.weights[taken]
+    points = points[np.searchsorted(influences.offsets, taken, side="right") - 1].astype(np.float64)
+    values = np.column_stack([points, (points * points).sum(axis=1), np.ones(len(points))])
+    sums = [np.bincount(bones, weights * each, len(wanted)) for each in values.T]
     return np.stack(sums, axis=1)
 
 
@@ -61,10 +63,12 @@ class Limbs(NamedTuple):
     """
     vectors  float64 [bones, 3], from the head of each bone to the end of its limb, at rest, armature space
     known    bool [bones]: False where nothing tells it, and what carries the bone stands across its own limb
+    by_skin  bool [bones]: whether the skin that the bone moves may tell it, whatever that is
     """
 
     vectors: np.ndarray
     known: np.ndarray
+    by_skin: np.ndarray
 
 
 def find_limbs(bones: Bones) -> Limbs:
@@ -83,7 +87,8 @@ class _Finder:
         self._joints = [self._to_joint(bone) for bone in range(len(bones.names))]
 
     def find(self) -> Limbs:
-        limbs = Limbs(self._own.copy(), np.ones(len(self._own), bool))
+        count = len(self._own)
+        limbs = Limbs(self._own.copy(), np.ones(count, bool), np.zeros(count, bool))
         # Whether each stands across its limb, or the nearest above whose joint tells it.
         stands_across: dict[int, bool] = {}
         for bone in self._bones.from_the_root:
@@ -129,7 +134,7 @@ class _Finder:
 
     def _set_end(self, limbs: Limbs, bone: int) -> None:
         skin, alike = self._to_skin(bone), [self._as(other, bone) for other in self._told_around(bone)]
-        limbs.known[bone] = skin is not None
+        limbs.known[bone], limbs.by_skin[bone] = skin is not None, True
         if alike and (skin is None or (len(alike) > 1 and alike[0] @ alike[1] >= ALIKE)):
             limbs.vectors[bone] = self._bones.lengths[bone] * alike[0]
         elif skin is not None:

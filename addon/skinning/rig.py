@@ -34,7 +34,7 @@ class Bones(OfArrays):
     envelopes     of all bones
     parents       int32 [bones], -1 for none
     complete      False where Blender had not computed the joints yet; bendy bones then count as straight
-    skin          of a mesh, as from limbs.skin_of(); None: not known
+    skin          of a mesh, as from limbs.skin_of(); None: not known, or not needed
     """
 
     names: tuple[str, ...]
@@ -206,7 +206,8 @@ class Weighting:
 
     @cached_property
     def _multiplies(self) -> bool:
-        return bool(self.bones.envelopes.multiply[self.entries.bones].any())
+        multiply = self.bones.envelopes.multiply
+        return bool(multiply.any() and multiply[self.entries.bones].any())
 
     @cached_property
     def depends_on_points(self) -> bool:
@@ -229,13 +230,14 @@ class Weighting:
         return entries.influences()
 
     def with_skin(self, points: np.ndarray | None) -> Weighting:
-        """Returns the same, whose bones know the skin that they move.
+        """Returns the same, whose bones know the skin that they move, where it may tell their limbs.
 
         points  float [vertices, 3] at rest, armature space; None where it has no size
         """
-        if points is None:
+        by_skin = self.bones.limbs.by_skin
+        if points is None or not by_skin.any():
             return self
-        skin = skin_of(self.influences(points), points, len(self.bones.names))
+        skin = skin_of(self.influences(points), points, by_skin)
         return replace(self, bones=replace(self.bones, skin=skin))
 
     def influences_over_joints(self, points: np.ndarray) -> Influences:
@@ -277,7 +279,7 @@ def describe_rig(weighting: Weighting, points: np.ndarray, boneless: Sequence[st
     return RigFacts(
         vertices=len(counts),
         bones=len(bones.names),
-        weighted_bones=len(np.unique(influences.bones)),
+        weighted_bones=np.count_nonzero(np.bincount(influences.bones)),
         mean_influences=float(counts.mean()) if len(counts) else 0.0,
         most_influences=int(counts.max(initial=0)),
         warnings=tuple(warnings),

@@ -112,7 +112,7 @@ class SkinDeformer:
     def _moving(self) -> np.ndarray:
         if self.weighting.use_envelopes:
             return np.flatnonzero(self.bones.deform)
-        return np.unique(self.weighting.entries.bones)
+        return np.flatnonzero(np.bincount(self.weighting.entries.bones))
 
     @cached_property
     def moving_bones(self) -> list[str]:

@@ -40,7 +40,7 @@ class TwistFinder:
         self._names, self._deform, self._parents = bones.names, bones.deform, bones.parents
         self._segments, self._children = bones.segments, bones.children
         self._deforming_parents = bones.deforming_parents
-        self._limbs, self._known = bones.limbs
+        self._limbs, self._known = bones.limbs.vectors, bones.limbs.known
         rest = bones.rest[: len(bones.names)].astype(np.float64)
         self._heads, self._own = rest[:, :3, 3], bones.lengths[:, None] * rest[:, :3, 1]
         self._left_out: list[str] = []

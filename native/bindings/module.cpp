@@ -27,4 +27,5 @@ PYBIND11_MODULE(_native, m) {
     sinew::bindings::bind_skinned_normals(m);
     sinew::bindings::bind_precompute(m);
     sinew::bindings::bind_threads(m);
+    sinew::bindings::bind_weights(m);
 }

@@ -18,5 +18,6 @@ void bind_delta_mush(pybind11::module_& m);
 void bind_normals(pybind11::module_& m);
 void bind_skinned_normals(pybind11::module_& m);
 void bind_precompute(pybind11::module_& m);
+void bind_weights(pybind11::module_& m);
 
 }  // namespace sinew::bindings

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 import scenes
 import whole_file
-from sinew_addon.attach import attach, other_tools, point_store, properties, stack
+from sinew_addon.attach import attach, modifier_types, other_tools, point_store, properties
 from sinew_addon.base.errors import SinewError
 from sinew_addon.deform import safe_mode, session, survey
 from sinew_addon.deform.plan import State
@@ -154,7 +154,7 @@ def test_hooks_behind_take_a_vertex_group(has_group):
 
 def test_nothing_is_left_where_blender_alone_knows_that_sinew_can_not_be_added(monkeypatch):
     """A sculpted character; test_fuzz.py and test_scripted_walks.py have what Sinew knows, too."""
-    monkeypatch.setattr(stack, "NEED_ORIGINAL_MESH", frozenset())
+    monkeypatch.setattr(modifier_types, "NEED_ORIGINAL_MESH", frozenset())
     obj, armature = scenes.make_arm()
     scenes.deform_by_parent(obj, armature)
     obj.modifiers.new("Multires", "MULTIRES")

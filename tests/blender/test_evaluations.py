@@ -15,7 +15,7 @@ import bpy
 import numpy as np
 import pytest
 import scenes
-from sinew_addon.attach import attach, properties
+from sinew_addon.attach import attach, layout, properties
 from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.deform import session
 from sinew_addon.io import files, mesh_io
@@ -186,7 +186,7 @@ def test_what_changes_along_with_a_pose_is_noticed(change):
     CHANGES[change](obj, armature)
     pose(armature)
     shown, state = scenes.final_points(obj), session.state_of(obj)
-    assert state.is_as_noted(obj)
+    assert state.is_as_noted(obj, layout.read(obj))
     assert state.noted.name == obj.name
     scenes.assert_as_without(obj, shown)
 

@@ -3,10 +3,12 @@
 
 from __future__ import annotations
 
+import struct
+
 import bpy
 import numpy as np
 import pytest
-from sinew_addon.io import mesh_io
+from sinew_addon.io import mesh_io, mesh_memory
 from sinew_addon.skinning.influences import GroupWeights
 
 
@@ -82,9 +84,8 @@ def test_meshes_of_all_kinds():
 
 
 @pytest.mark.parametrize("levels", [1, 3])
-def test_no_bmesh_of_a_mesh_with_more_vertices_than_its_keys(monkeypatch, levels):
-    """For an evaluated mesh whose modifiers made more vertices than its keys have: Blender reads garbage
-    there, or crashes."""
+def test_a_mesh_with_more_vertices_than_its_keys(levels):
+    """An evaluated mesh whose modifiers made more vertices than its keys have."""
     obj = a_grid()
     weigh_at_random(obj, 4, 5)
     obj.modifiers.new("Subdivision", "SUBSURF").levels = levels
@@ -93,8 +94,66 @@ def test_no_bmesh_of_a_mesh_with_more_vertices_than_its_keys(monkeypatch, levels
     obj.shape_key_add(name="Basis")
     obj.shape_key_add(name="Key")
     evaluated = obj.evaluated_get(bpy.context.evaluated_depsgraph_get()).data
-    if evaluated.shape_keys is not None:
-        monkeypatch.setattr(mesh_io, "bmesh", None)
     assert read_alike(evaluated).equals(expected)
-    monkeypatch.undo()
     assert read_alike(obj.data).counts.shape == (len(obj.data.vertices),)
+
+
+def structures(catalogue: bytes, wanted: set[str]) -> dict[str, dict[str, int]]:
+    """The offset of each field of structures, by their names, and as "" their sizes.
+
+    catalogue  a blend file: its names, types, sizes and structures come in this order
+    """
+    start = catalogue.index(b"SDNANAME") + 4
+
+    def strings(place: int) -> tuple[list[str], int]:
+        (count,) = struct.unpack_from("=i", catalogue, place + 4)
+        texts = catalogue[place + 8 :].split(b"\0", count)[:count]
+        return [text.decode() for text in texts], aligned(place + 8 + sum(map(len, texts)) + count)
+
+    def aligned(place: int) -> int:
+        return place + (start - place) % 4
+
+    names, place = strings(start)
+    types, place = strings(place)
+    sizes = struct.unpack_from(f"={len(types)}H", catalogue, place + 4)
+    place = aligned(place + 4 + 2 * len(types))
+    (count,) = struct.unpack_from("=i", catalogue, place + 4)
+    place, found = place + 8, {}
+    for _number in range(count):
+        kind, length = struct.unpack_from("=2H", catalogue, place)
+        fields, offset = struct.unpack_from(f"={2 * length}H", catalogue, place + 4), 0
+        if types[kind] in wanted:
+            own = found[types[kind]] = {"": sizes[kind]}
+            for of, number in zip(fields[::2], fields[1::2], strict=True):
+                name = names[number]
+                own[name.partition("[")[0]] = offset
+                of_one = 8 if name[0] in "*(" else sizes[of]
+                offset += of_one * int(np.prod([int(part[:-1]) for part in name.split("[")[1:]]))
+            assert offset == sizes[kind]
+        place += 4 + 4 * length
+    return found
+
+
+def test_blender_keeps_groups_where_its_files_say(tmp_path):
+    bpy.context.view_layer.update()
+    bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "a.blend"), compress=False)
+    wanted = {"Mesh", "CustomData", "CustomDataLayer", "MDeformVert", "MDeformWeight"}
+    found = structures((tmp_path / "a.blend").read_bytes(), wanted)
+    layer, own = found["CustomDataLayer"], found["CustomData"]
+    offsets = mesh_memory.Offsets(found["Mesh"]["vdata"] + own["*layers"], layer["*data"], layer[""])
+    assert mesh_memory.OFFSETS[bpy.app.version[:2]] == offsets
+    assert own["totlayer"] - own["*layers"] == mesh_memory.LAYER_COUNT
+    assert layer["type"] == 0
+    vertex, entry = found["MDeformVert"], found["MDeformWeight"]
+    assert (vertex["*dw"], vertex["totweight"], vertex[""]) == (0, 8, 16)
+    assert (entry["def_nr"], entry["weight"], entry[""]) == (0, 4, 8)
+
+
+def test_a_blender_whose_memory_is_not_known_is_read_vertex_by_vertex(monkeypatch):
+    obj = a_grid(4)
+    assert mesh_memory.address_of_groups(obj.data) == 0
+    weigh_at_random(obj, 5, 1)
+    assert mesh_memory.address_of_groups(obj.data) > 0
+    monkeypatch.setattr(mesh_memory, "OFFSETS", {})
+    assert mesh_memory.address_of_groups(obj.data) is None
+    read_alike(obj.data)

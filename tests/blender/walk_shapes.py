@@ -259,7 +259,8 @@ def _limbs(
 ) -> np.ndarray:
     """Where the limb of each bone goes, which test_twist_spread and test_battery check."""
     bones, points = armature_io.read_bones(rig), walk_sides.points_of(mesh.vertices)
-    skin = skin_of(Influences(*influences.arrays), transformed(points, space), len(bones.names))
+    everywhere = np.ones(len(bones.names), bool)
+    skin = skin_of(Influences(*influences.arrays), transformed(points, space), everywhere)
     return replace(bones, skin=skin).limbs.vectors.astype(np.float32)
 
 

@@ -243,6 +243,23 @@ def test_features_import_each_other_one_way():
     assert waiting == {}
 
 
+def walks_of_modifiers(text):
+    """Lines that go through a collection of modifiers, or make a list of it: not an F-curve's, a layout's."""
+    walk = re.compile(r"(\bfor .* in |\blist\(|\benumerate\()(?!curve\.|now\.)[\w.]+\.modifiers\b(?!\[|\.)")
+    return [line.strip() for line in text.splitlines() if walk.search(line)]
+
+
+def test_only_attach_walks_stacks_of_modifiers():
+    """Others are given a Layout, read once for each event. io/read_only.py looks for the caches of all
+    objects."""
+    assert walks_of_modifiers("for m in obj.modifiers:")
+    assert walks_of_modifiers("list(obj.modifiers)[1]")
+    assert not walks_of_modifiers("for m in curve.modifiers: obj.modifiers['A'].name")
+    files = room_files("deform", "ui", "features", "jobs", "commands")
+    found = {path.name: walks_of_modifiers(path.read_text(encoding="utf-8")) for path in files}
+    assert {name: lines for name, lines in found.items() if lines} == {}
+
+
 def test_the_extension_checks_all_names_that_it_uses_of_the_library():
     """addon/native.py reports in a sentence if an older library lacks it."""
     addon = ROOT / "addon"

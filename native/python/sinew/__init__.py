@@ -42,6 +42,7 @@ from ._native import (
     methods,
     stages,
     thread_id,
+    weights_in_memory,
 )
 
 __all__ = [
@@ -72,4 +73,5 @@ __all__ = [
     "spline",
     "stages",
     "thread_id",
+    "weights_in_memory",
 ]

@@ -12,7 +12,7 @@ from . import dual
 from . import quat
 from . import interpolate
 from . import spline
-__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id']
+__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id', 'weights_in_memory']
 class Parameter:
     """A setting of a method or of a stage."""
     def __repr__(self) -> str: ...
@@ -499,5 +499,20 @@ def stages() -> tuple[Stage, ...]:
     """All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush."""
 def thread_id() -> int:
     """A number that no other thread has as long as this one runs."""
+def weights_in_memory(address: typing.SupportsInt | typing.SupportsIndex, vertices: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+    """Read the vertex groups of a mesh from the memory of Blender, in whose process this runs.
+
+    Args:
+        address: that of the first of the mesh's MDeformVert, as many as it has vertices. Nothing can check it: with
+            another one the process crashes.
+        vertices: how many.
+
+    Returns:
+        int32 [vertices], the entries of each vertex; int32 [entries], the group of each, in the order of the
+        vertices and as stored; float32 [entries], its weight.
+
+    Raises:
+        ValueError: the address is 0, or not aligned.
+    """
 __compiled_in__: str
 __version__: str
