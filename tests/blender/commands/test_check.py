@@ -14,7 +14,7 @@ import pytest
 import scenes
 from conftest import IS_NEWEST
 from program import run_sinew
-from sinew_addon.attach import attach, properties
+from sinew_addon.attach import properties
 from sinew_addon.commands.check import line_of
 
 pytestmark = pytest.mark.outer_versions

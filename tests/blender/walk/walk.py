@@ -3,7 +3,7 @@
 
     python tests/blender/walk/walk.py --steps 10000 [--seed 0] [--route both|evaluation|update] [--keep DIR]
 
-A walk is a list of operations (walk_operations), each with its own random numbers, so that any of them can
+A walk is a list of operations (operations/), each with its own random numbers, so that any of them can
 be left out. Two processes execute them: one with Sinew, one with the Armature modifiers, with Preserve
 Volume where Sinew's method is dq. For methods and stages that Blender lacks, the library computes the shape
 from the data of the Blender without Sinew (walk_shapes). After most steps the final points of all meshes,
@@ -34,6 +34,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
+import operations
 
 HERE = Path(__file__).resolve().parent
 TOLERANCE = 1e-5
@@ -584,7 +585,7 @@ def replay(steps: Sequence[Step], route: str) -> int:
 
 def operation_weights() -> dict[str, float]:
     """The relative frequency of each operation, by name."""
-    text = (HERE / "walk_operations.py").read_text()
+    text = "".join((HERE / "operations" / f"{part}.py").read_text() for part in operations.PARTS)
     found = re.findall(r"^@operation\(([\d.]+)\)\ndef (\w+)\(", text, re.MULTILINE)
     return {name: float(weight) for weight, name in found}
 

@@ -15,8 +15,10 @@ import random
 import re
 import sys
 import zlib
+from importlib import import_module
 from pathlib import Path
 
+import operations
 import walk_script
 
 
@@ -62,11 +64,15 @@ class Child:
     def __init__(self, role: str, route: str, folder: Path, errors: Path) -> None:
         import bpy
         import numpy as np
-        import walk_operations
         import walk_shapes
         import walk_sides
+        import walk_start
+        import walker
 
-        self.bpy, self.np, self.operations, self.sides = bpy, np, walk_operations, walk_sides
+        self.bpy, self.np, self.operations, self.sides = bpy, np, walker.OPERATIONS, walk_sides
+        self.start_file, self.nothing_error = walk_start.start, walker.NothingError
+        for part in operations.PARTS:
+            import_module(f"operations.{part}")
         self.shapes_of = walk_shapes
         self.errors = errors
         self.read_to = 0
@@ -77,14 +83,14 @@ class Child:
         else:
             self.side = walk_sides.BlenderSide()
         self.side.prepare(safe=route == "safe")
-        self.walker = walk_operations.Walker(self.side, folder)
+        self.walker = walker.Walker(self.side, folder)
         self.walker.before_evaluation = self.before_evaluation
         self.walker.expect_rendered = self.expect_rendered
         self.walker.points_of = self.points_of
         bpy.utils.register_class(make_engine(self.walker, self.points_of))
         self.claims: dict = {}
         self.wrong: list[str] = []
-        walk_operations.make_library(self.walker)
+        walk_start.make_library(self.walker)
 
     # --- Requests
 
@@ -92,7 +98,7 @@ class Child:
         self.claims, self.wrong = {}, []
         self.side.set_safe(False)
         self.side.compute_beside(False)
-        self.operations.start(self.walker)
+        self.start_file(self.walker)
         self.bpy.ops.ed.undo_push(message="start")
         # Those of a file that an earlier walk left broken.
         self.problems()
@@ -110,12 +116,12 @@ class Child:
         numbers = walk_script.Chosen(seed, words) if words else random.Random(seed)
         if words:
             self.walker.chosen = ""
-        operation = self.operations.OPERATIONS[name]
+        operation = self.operations[name]
         self.walker.rendered, self.walker.rendered_by_library = {}, {}
         outcome = "done"
         try:
             said = operation.act(self.walker, numbers)
-        except self.operations.NothingError:
+        except self.nothing_error:
             outcome, said = "nothing", name
         except Exception as error:
             outcome, said = "refused", f"{name}: {type(error).__name__}: {error}"

@@ -3,7 +3,7 @@
 
     add Arm dq; frame 11; ~weights Arm lower; +duplicate Arm 0.9
 
-A step is an operation (walk_operations) and what it chooses: names and whole numbers where it chooses among
+A step is an operation (operations/) and what it chooses: names and whole numbers where it chooses among
 these, and numbers with a point for its random numbers from 0 to 1. What is not written is the first choice,
 and 0.3. The sides are not compared after a step with ~; one with + pushes an undo step.
 """
