@@ -283,7 +283,7 @@ def pytest(
 ) -> None:
     marks = " and ".join(filter(None, [marks, "" if IS_ALL or session.posargs else "not slow"]))
     line = f"{LIMIT}{python_in(name)} -X faulthandler -m pytest -p no:cacheprovider --durations=25"
-    words = [*line.split(), "--durations-min=4", "-m", marks, folder, *session.posargs]
+    words = [*line.split(), "--durations-min=4", "-m", marks, *folder.split(), *session.posargs]
     env = ONE_BLAS_THREAD | (env or {})
     # With options such as -k, a suite may have no test to run.
     session.run(*words, success_codes=[0, 5] if session.posargs else [0], env=env)
@@ -311,7 +311,7 @@ NEWEST_TESTED = os.environ.get("SINEW_TESTED", NEWEST).split()[-1]
 job("window", "package")(
     functools.partial(pytest, name=f"bpy-{NEWEST_TESTED}", folder="tests/blender", marks="window")
 )
-job("python")(functools.partial(pytest, name=f"bpy-{EVERYDAY}", folder="tests/python"))
+job("python")(functools.partial(pytest, name=f"bpy-{EVERYDAY}", folder="tests/python tests/project"))
 job("experiments")(functools.partial(pytest, name=f"bpy-{EVERYDAY}", folder="experiments/tests"))
 job("shader")(functools.partial(pytest, name="shaders", folder="tests/shaders"))
 
@@ -553,13 +553,13 @@ def wheel(words: list[str]) -> int:
 
 
 PROGRAMS = {
-    "fuzz": "tests/blender/fuzz_parity.py",
-    "walk": "tests/blender/walk.py",
-    "soak": "tests/blender/soak.py",
-    "corpus": "tests/blender/corpus.py",
+    "fuzz": "tests/blender/programs/fuzz_parity.py",
+    "walk": "tests/blender/walk/walk.py",
+    "soak": "tests/blender/programs/soak.py",
+    "corpus": "tests/blender/programs/corpus.py",
     "pictures": "tools/pictures/draw_methods.py",
     "benchmark": "tools/pictures/draw_benchmark.py",
-    "golden": "tests/blender/make_golden.py",
+    "golden": "tests/golden/make_golden.py",
 }
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     **{name: functools.partial(in_blender, program=program) for name, program in PROGRAMS.items()},

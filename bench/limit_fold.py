@@ -23,7 +23,7 @@ from sinew_addon.io import armature_io, mesh_io
 from sinew_addon.skinning.rig import Bones
 from sinew_addon.skinning.vectors import transformed
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 from rigs import influences
 from tube import Tube
 

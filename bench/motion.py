@@ -20,7 +20,7 @@ from scipy.spatial.transform import RigidTransform, Rotation, Slerp
 from sinew import interpolate, quat_vec
 from sinew_addon.base.steps import result_of
 
-sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "python"))
+sys.path.append(str(Path(__file__).resolve().parents[1] / "tests" / "support"))
 import walks
 
 BONES, FRAMES = 60, 120

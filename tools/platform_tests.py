@@ -32,26 +32,20 @@ NATIVE: dict[str, list[str | Path]] = {
     "linux-arm64": ["qemu-aarch64-static", "-L", "/usr/aarch64-linux-gnu"],
     "windows-x64": ["wine"],
 }
-# Tests of the checkout, its documents and its tools, which do not depend on the platform: ./dev test runs
-# them.
-CHECKOUT_TESTS = (
-    *("test_documented", "test_hosting", "test_layering", "test_packages", "test_release"),
-    *("test_site", "test_snippets", "test_stub"),
-)
 # Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches
 # with kills.
 BLENDER_TESTS = (
-    *("test_against_armature_modifier", "test_changes", "test_restore", "test_saved_files"),
-    *("test_bake", "test_command_line", "test_batch"),
+    *("deform/test_against_armature_modifier", "deform/test_changes", "commands/test_restore"),
+    *("attach/test_saved_files", "features/bake/test_bake", "commands/test_command_line", "jobs/test_batch"),
 )
 # Single tests that do not run there, each with the reason.
 LEFT_OUT: dict[str, dict[str, str]] = {
     "linux-arm64": {},
     "windows-x64": {
-        "tests/blender/test_batch.py::test_200_files_on_one_machine_and_on_a_cluster": (
+        "tests/blender/jobs/test_batch.py::test_200_files_on_one_machine_and_on_a_cluster": (
             "it makes a folder that nobody may write in, as Linux knows them"
         ),
-        "tests/blender/test_batch.py::test_killed_at_random[cluster]": "dask by wine has not been tried",
+        "tests/blender/jobs/test_batch.py::test_killed_at_random[cluster]": "dask by wine has not been tried",
     },
 }
 BPY = "bpy==4.5.*"
@@ -154,9 +148,7 @@ def native_tests(platform: Platform, quick: bool) -> int:
 
 def python_tests(emulated: Emulated, options: Sequence[str]) -> int:
     emulated.set_up_python()
-    all_tests = ["tests/python"]
-    all_tests += [f"--ignore=tests/python/{name}.py" for name in CHECKOUT_TESTS]
-    return emulated.pytest(LIMITS["python"], *(options or all_tests))
+    return emulated.pytest(LIMITS["python"], *(options or ["tests/python"]))
 
 
 def blender_tests(emulated: Emulated, options: Sequence[str]) -> int:

@@ -10,4 +10,4 @@ ROOT = Path(__file__).resolve().parents[2]
 PROGRAMS = os.environ.get("SINEW_EXPERIMENTS")
 if PROGRAMS is None:
     collect_ignore_glob = ["test_*.py"]
-sys.path += [PROGRAMS or "", *(str(ROOT / "tests" / folder) for folder in ("python", "blender"))]
+sys.path += [PROGRAMS or "", str(ROOT / "tests" / "support")]

@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects fits, with 2,000 seeded cases each, compared with 50 digits as tests/python/test_exact.py does."""
+"""Protects fits, with 2,000 seeded cases each, compared with 50 digits as
+tests/python/library/test_exact.py does."""
 
 import exact_fits
 import pytest

@@ -23,8 +23,8 @@ from sinew_addon.deform import characters, precompute_watch, small_meshes
 from sinew_addon.skinning.precompute import precomputations
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-# The reader of glTF for engines, and what tests of Python have, too.
-sys.path += [str(REPOSITORY / "shaders"), str(REPOSITORY / "tests" / "python")]
+# Tests of one folder share set-ups with those of another.
+sys.path += [str(path) for path in sorted(Path(__file__).parent.rglob("*")) if path.is_dir()]
 BLEND_FILES = sorted((REPOSITORY / "blend_files").glob("*.blend"))
 REAL_RIGS = ("human.blend", "CesiumMan.glb", "Fox.glb")
 

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects what only C++ can ask of a Deformer: poses of too few bones, sizes and parameters that do not fit,
-// moves, and new rest points beside a frame. tests/python/test_deformer.py has the rest.
+// moves, and new rest points beside a frame. tests/python/library/test_deformer.py has the rest.
 #include <algorithm>
 #include <atomic>
 #include <cmath>

@@ -24,7 +24,8 @@ FORMS = ["continuous", "kim_han"]
 STAGES = ["mix", "twist_spread", "bulge_limit"]
 TOLERANCE = 1e-5
 MOST = 8
-# A turn more than the golden set has: by numpy, which tests/blender/test_viewer.py compares with Blender.
+# A turn more than the golden set has: by numpy, which tests/blender/features/pages/test_viewer.py compares
+# with Blender.
 TURNED = {
     "array": "turned",
     "method": "dq",

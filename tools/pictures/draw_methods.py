@@ -30,7 +30,7 @@ from sinew_addon.features.pages.views import View, close_view, seen_extent, whol
 from sinew_addon.io import files
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-sys.path.append(str(REPOSITORY / "tests" / "python"))
+sys.path.append(str(REPOSITORY / "tests" / "support"))
 import tube as tubes  # noqa: E402 - it is found there
 
 CELL = 240

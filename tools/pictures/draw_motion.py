@@ -3,7 +3,7 @@
 
     python tools/pictures/draw_motion.py [--out docs]
 
-An arm between two poses, skinned by the library, and the walks of tests/python/walks.py. Without Blender.
+An arm between two poses, skinned by the library, and the walks of tests/support/walks.py. Without Blender.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ matplotlib.use("agg")
 import matplotlib.pyplot as plt
 
 REPOSITORY = Path(__file__).resolve().parents[2]
-sys.path.append(str(REPOSITORY / "tests" / "python"))
+sys.path.append(str(REPOSITORY / "tests" / "support"))
 import walks  # noqa: E402 - it is found there
 
 # Upper arm, forearm, hand.

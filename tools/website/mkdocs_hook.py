@@ -35,6 +35,7 @@ OUTSIDE = {
     "experiments/README.md": "experiments.html",
     "experiments/future_work/fits.md": "fits.html",
     "experiments/future_work/ik.md": "ik.html",
+    "tests/README.md": "tests.html",
     "tests/golden/README.md": "golden.html",
 }
 
