@@ -137,6 +137,8 @@ def read(
     for option, its_bones, space, its_old in itertools.zip_longest(options, bones, spaces_now, before):
         if option is None:
             break
+        if its_old is not None and its_bones.equals(its_old.deformer.bones):
+            its_bones = its_old.deformer.bones.without_skin
         weighting = option.weighting(read_now.group_names, read_now.weights, its_bones)
         weighting = _with_skin(weighting, read_now, space)
         deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))

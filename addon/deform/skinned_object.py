@@ -335,6 +335,7 @@ def _own_facts(obj: bpy.types.Object, now: Layout) -> list:
         obj.show_only_shape_key,
         obj.instance_type,
         keys is None or keys.use_relative,
+        settings.before.smooth.name,
     ]
     if settings.storage.upstream_proxy is not None:
         state.append(upstream_proxy.signature(obj, now))

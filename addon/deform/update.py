@@ -242,13 +242,23 @@ class _Event:
         if new.is_read:
             self.seen = _check_modifiers(self.obj, self.layout, self.changes)
             new = self._full_plan()
-        if not (new.uses_builtin or self._is_copy_known()):
-            self.is_copy_outdated = not upstream_proxy.is_current(self.obj)
-        if self.is_copy_outdated:
-            upstream_proxy.set_outdated(self.obj)
-        apply_plan.apply(self.obj, self.old, new)
-        self.seen = None
+        if not self._is_applied(facts, new):
+            if not (new.uses_builtin or self._is_copy_known()):
+                self.is_copy_outdated = not upstream_proxy.is_current(self.obj)
+            if self.is_copy_outdated:
+                upstream_proxy.set_outdated(self.obj)
+            apply_plan.apply(self.obj, self.old, new)
+            self.seen = None
         self.known = replace(self.known, plan=new, is_planned=True)
+
+    def _is_applied(self, facts: Facts, new: Plan) -> bool:
+        """Whether the plan stays, and so does what it was applied to: a choice of method, for example, changes
+        no modifier."""
+        skinned, obj = self.skinned, self.obj
+        if skinned is None or new != self.old or not new.is_in_depsgraph or not properties.of(obj).enabled:
+            return False
+        is_only_due = facts.is_due and replace(facts, is_due=False).calls_for_plan is False
+        return is_only_due and skinned.is_as_noted(obj, self.layout) and skinned.has_same_surroundings(obj)
 
     def _full_plan(self) -> Plan:
         failure = ""

@@ -89,6 +89,11 @@ class Bones(OfArrays):
         return axes
 
     @cached_property
+    def rest_from_armature(self) -> np.ndarray:
+        """float64 [bones + joints, 4, 4]: the inverses of `rest`."""
+        return np.linalg.inv(self.rest.astype(np.float64))
+
+    @cached_property
     def limbs(self) -> Limbs:
         """Where the limb of each bone goes, which may be across the bone."""
         return find_limbs(self)
@@ -106,6 +111,11 @@ class Bones(OfArrays):
         """float64 [bones, 3]: `limbs` in each bone's own axes: along Y unless it stands across."""
         own = np.linalg.pinv(self.rest[: len(self.names), :3, :3].astype(np.float64))
         return (own @ self.limbs.vectors[..., None])[..., 0]
+
+    @property
+    def without_skin(self) -> Bones:
+        """The same, with all that was made of them where no skin tells a limb."""
+        return self if self.skin is None else replace(self, skin=None)
 
     def with_skin_of(self, other: Bones) -> Bones:
         """Returns the same, whose skin is also that of the same bones for another mesh."""
@@ -279,7 +289,7 @@ def describe_rig(weighting: Weighting, points: np.ndarray, boneless: Sequence[st
     return RigFacts(
         vertices=len(counts),
         bones=len(bones.names),
-        weighted_bones=np.count_nonzero(np.bincount(influences.bones)),
+        weighted_bones=int(np.count_nonzero(np.bincount(influences.bones))),
         mean_influences=float(counts.mean()) if len(counts) else 0.0,
         most_influences=int(counts.max(initial=0)),
         warnings=tuple(warnings),

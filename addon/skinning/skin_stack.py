@@ -90,7 +90,6 @@ class SkinDeformer:
         self.mix_weights = mix_weights
         self.vertex_data = vertex_data
         self.bones = weighting.bones
-        self._rest_from_armature = np.linalg.inv(self.bones.rest.astype(np.float64))
         # The packed mesh with its rest points, for each purpose, set of methods with vertex data, and what an
         # engine keeps of the influences; the deformer for each purpose.
         self._packed: dict[tuple[str, frozenset[str], tuple[str, int]], tuple[sinew.Binding, np.ndarray]] = {}
@@ -186,7 +185,7 @@ class SkinDeformer:
             frame.pose,
             points,
             out=out,
-            rest_inverses=self._rest_from_armature,
+            rest_inverses=self.bones.rest_from_armature,
             **self._arguments_of(frame),
         )
         return True
@@ -208,9 +207,9 @@ class SkinDeformer:
     def _shape_with_one_kind(self, frame: ModifierFrame, out: np.ndarray, purpose: str) -> None:
         """Writes the shape for methods that take the same kind of bone matrices."""
         rest_points, bones = self.rest_points, frame.pose
-        rest_inverses: np.ndarray | None = self._rest_from_armature
+        rest_inverses: np.ndarray | None = self.bones.rest_from_armature
         if frame.scale_rule != BLENDER_4.name:
-            motions = frame.pose.astype(np.float64) @ self._rest_from_armature
+            motions = frame.pose.astype(np.float64) @ self.bones.rest_from_armature
             split = sinew.affine.split_scale(motions, self.bones.rest_axes.astype(np.float64))
             if frame.scale_rule == IGNORED.name:
                 bones, rest_inverses = split.rigid.astype(np.float32), None
