@@ -23,6 +23,8 @@ from . import pose, source
 from .plan import State
 from .skinned_object import Shown, SkinnedObject
 
+# How many evaluated copies of an object are remembered.
+_MAX_COPIES = 32
 _NO_NORMALS = np.empty((0, 3), dtype=np.float32)
 
 
@@ -126,15 +128,23 @@ def _leave_out(
 ) -> None:
     """Switches these Armature modifiers off in evaluated data, where Sinew's modifier comes after them and
     sets each vertex: on a large mesh they take as long as Sinew. Sinew's own are on where it deforms.
-    foreach_set() tags nothing, which is not allowed here.
+    foreach_set() tags nothing, which is not allowed here. Once for each copy that Blender makes.
 
     Exporters evaluate for themselves, and find them as they are: USD writes a skin where one is on.
     """
+    stack_now, known = evaluated.modifiers, skinned.noted.layout
+    left_out = {replaced.name for replaced, _armature in modifiers}
+    copy = evaluated.as_pointer()
+    # Of a copy that is marked, the address is known.
+    if stack_now[known.sinew].show_in_editmode and skinned.evaluation.left_out.get(copy) == left_out:
+        return
     if any(".show_" in path for path in animated_paths(evaluated)):
         # An animation that was just added decides from now on.
         return
-    stack_now, known = evaluated.modifiers, skinned.noted.layout
-    left_out = {replaced.name for replaced, _armature in modifiers}
+    if len(skinned.evaluation.left_out) > _MAX_COPIES:
+        # Each frame of a render can have made one.
+        skinned.evaluation.left_out.clear()
+    skinned.evaluation.left_out[copy] = left_out
     for view, of_view in zip(VIEWS, icons, strict=True):
         is_by_sinew = of_view.deformer is Deformer.SINEW
         shown = [

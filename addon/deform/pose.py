@@ -2,6 +2,7 @@
 """Reads the inputs of each Armature modifier in one evaluation: pose, method, scale rule."""
 
 from dataclasses import replace
+from math import isfinite
 
 import bpy
 import numpy as np
@@ -99,7 +100,8 @@ def read(
 
 def _finite(pose: np.ndarray, bones: Bones) -> np.ndarray:
     """Returns the pose with bones at rest where theirs is not finite."""
-    if np.isfinite(pose).all():
+    # No sum with such a number is finite, and adding takes half of the time.
+    if isfinite(np.add.reduce(pose, axis=None)) or np.isfinite(pose).all():
         return pose
     is_finite = np.isfinite(pose).all(axis=(1, 2), keepdims=True)
     return np.where(is_finite, pose, bones.rest)

@@ -53,6 +53,7 @@ class Evaluation:
                          the same event, while Blender keeps the mesh
     mesh_shown           the address of the evaluated mesh that viewports showed last, or 0
     icons                of the viewport and of renders, as the artist or an animation set them
+    left_out             the names of the modifiers that are switched off in an evaluated copy, by its address
     is_event_known       Blender called handlers before the evaluation, or Sinew caused it
     was_tagged           Sinew has tagged the object for another evaluation since
     changed_unannounced  the mesh was replaced without any event before the evaluation
@@ -66,6 +67,7 @@ class Evaluation:
     mesh: int = 0
     mesh_shown: int = 0
     icons: tuple[Icons, Icons] | None = None
+    left_out: dict[int, set[str]] = field(default_factory=dict)
     is_event_known: bool = True
     was_tagged: bool = False
     changed_unannounced: bool = False
@@ -186,6 +188,7 @@ class SkinnedObject:
                 old = self.evaluation
                 self.evaluation = Evaluation(
                     icons=old.icons,
+                    left_out=old.left_out,
                     failures=old.failures,
                     failure=old.failure,
                     failures_in_a_row=old.failures_in_a_row,

@@ -476,19 +476,19 @@ class SkinStack:
                 start = np.zeros_like(result)
                 before = self._frames[number] if number < len(self._frames) else None
                 changed |= before is None or not are_equal(back, before.model_from_bones)
-            is_end = skin.deformer is self._end
-            changed |= skin.deformer.deform(start, frame, out if is_end else None)
+            if skin.deformer is self._end:
+                # Its points may be in `out` alone: reading them would compute them a second time.
+                changed |= skin.deformer.deform(start, frame, out)
+                break
+            changed |= skin.deformer.deform(start, frame)
             moved = skin.deformer.points
             if back is not None:
                 if mask is not None and number not in starts:
                     # As in Blender, only a vertex without any share is not brought to the origin.
                     moved, mask = mask[:, None] * moved, mask > 0.0
                 moved = transformed(moved, back).astype(np.float32)
-            if mask is not None:
-                result = result + mask[:, None] * (moved - result)
-            elif not is_end:
-                # A copy, as the next modifier compares its input with the last one: the array must not be
-                # overwritten.
-                result = moved.copy()
+            # A copy, as the next modifier compares its input with the last one: the array must not be
+            # overwritten.
+            result = moved.copy() if mask is None else result + mask[:, None] * (moved - result)
         self._points = result
         return changed

@@ -21,6 +21,7 @@ from sinew_addon.deform import session
 from sinew_addon.io import files, mesh_io
 from sinew_addon.jobs.job_file import Settings
 from sinew_addon.jobs.tasks import reskin
+from sinew_addon.skinning.skin_stack import SkinDeformer
 
 
 @pytest.fixture
@@ -107,6 +108,17 @@ def test_posing_evaluates_the_mesh_once(set_up):
     scenes.add_sinew(obj)
     bpy.context.scene.frame_set(2)
     assert [evaluations_in(lambda: pose(armature), obj.name) for _ in range(3)] == [1, 1, 1]
+
+
+@pytest.mark.usefixtures("route")
+def test_a_frame_computes_the_shape_once(monkeypatch):
+    scenes.skinned_arm()
+    bpy.context.scene.frame_set(2)
+    shapes, shape = [], SkinDeformer._shape
+    monkeypatch.setattr(SkinDeformer, "_shape", lambda *args: (shapes.append(args), shape(*args)))
+    for frame in (3, 4, 5):
+        bpy.context.scene.frame_set(frame)
+    assert len(shapes) == 3
 
 
 @pytest.mark.usefixtures("counting")
