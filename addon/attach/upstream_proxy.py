@@ -11,10 +11,8 @@ import bpy
 from ..base.errors import SinewError
 from ..io import mesh_compare
 from ..io.actions import animated_paths
-from ..skinning.influences import GroupWeights
 from . import layout, node_group, properties, references, undeformed
 from .layout import Layout
-from .modifier_types import ONLY_DEFORM
 
 # A Multi Modifier directly behind one of these mixes with what it got, not with what it made.
 _MIXED_BY_MULTI_MODIFIERS = {"LATTICE", "MESH_DEFORM"}
@@ -118,11 +116,10 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
     if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares:
         # Never the old one with another mesh: see references.py.
         references.note(obj)
-        old_mesh = proxy.data.session_uid if proxy is not None else 0
         remove(obj)
         proxy = storage.upstream_proxy = _make(obj, now, shares)
         proxy[_MADE_FROM] = wanted
-        if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data, old_mesh):
+        if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data):
             share_mesh(obj)
             return ensure(obj)
         just_made.add(proxy.session_uid)
@@ -250,14 +247,6 @@ def _is_requested(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool
             nodes is not None and nodes.show_viewport and obj.visible_get(view_layer=depsgraph.view_layer)
         )
     return is_shown and node_group.get_input(nodes, "Upstream") is not None
-
-
-def known_weights(obj: bpy.types.Object) -> GroupWeights | None:
-    """Returns the weights of the mesh that the Armature modifier gets, where they are those of a copy that
-    has been compared with the mesh; else None."""
-    if shares_mesh(obj) or any(each.kind not in ONLY_DEFORM for each in layout.read(obj).changes_ahead):
-        return None
-    return mesh_compare.weights_of(properties.of(obj).storage.upstream_proxy.data)
 
 
 def changes_weights(now: Layout) -> bool:

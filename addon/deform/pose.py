@@ -2,7 +2,6 @@
 """Reads the inputs of each Armature modifier in one evaluation: pose, method, scale rule."""
 
 from dataclasses import replace
-from math import isfinite
 
 import bpy
 import numpy as np
@@ -100,8 +99,7 @@ def read(
 
 def _finite(pose: np.ndarray, bones: Bones) -> np.ndarray:
     """Returns the pose with bones at rest where theirs is not finite."""
-    # No sum with such a number is finite, and adding takes half of the time.
-    if isfinite(np.add.reduce(pose, axis=None)) or np.isfinite(pose).all():
+    if np.isfinite(pose).all():
         return pose
     is_finite = np.isfinite(pose).all(axis=(1, 2), keepdims=True)
     return np.where(is_finite, pose, bones.rest)
@@ -178,5 +176,7 @@ def _taking_part(icons: tuple[Icons, Icons], mode: str) -> tuple[bool, ...]:
     deforms in both, they agree."""
     if mode:
         return icons[mode == "RENDER"].modifiers
-    by_sinew = (each.modifiers for each in icons if each.deformer is Deformer.SINEW)
-    return next(by_sinew, (False,) * len(icons[0].modifiers))
+    for each in icons:
+        if each.deformer is Deformer.SINEW:
+            return each.modifiers
+    return (False,) * len(icons[0].modifiers)

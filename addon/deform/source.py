@@ -148,10 +148,7 @@ def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bo
     names = _group_names(obj, depsgraph)
     from_upstream = properties.of(obj).storage.upstream_proxy is not None
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
-    weights = upstream_proxy.known_weights(obj) if from_upstream else None
-    if weights is None or len(weights.counts) != len(mesh.vertices):
-        # Reading them takes longer than all else.
-        weights = mesh_io.read_group_weights(mesh)
+    weights = mesh_io.read_group_weights(mesh)
     points = _finite(mesh_io.read_points(mesh))
     mesh_points = _finite(mesh_io.read_points(obj.data)) if from_upstream else points
     keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights)

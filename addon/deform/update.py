@@ -252,7 +252,7 @@ class _Event:
         self.known = replace(self.known, plan=new, is_planned=True)
 
     def _is_applied(self, facts: Facts, new: Plan) -> bool:
-        """Whether the plan stays, and so does what it was applied to: choosing a method, for example, changes no
+        """Whether the plan stays, and so does what it was applied to: choosing a method changes no
         modifier."""
         skinned, obj = self.skinned, self.obj
         if skinned is None or new != self.old or not new.is_in_depsgraph or not properties.of(obj).enabled:

@@ -2,13 +2,11 @@
 """Compares a mesh with its copy, and keeps the copy's points as those of the mesh."""
 
 from collections.abc import Iterator
-from dataclasses import replace
 
 import bpy
 import numpy as np
 
 from ..skinning.arrays import read
-from ..skinning.influences import GroupWeights
 from . import mesh_io
 
 _SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")
@@ -32,55 +30,21 @@ _VALUES = {
 def are_alike(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
     """Whether modifiers make the same of both: their points, faces, attributes, weights, materials and shape
     keys, but for the values of the keys. Neither is in edit mode."""
-    _newer_weights.clear()
-    if not _are_alike_but_for_weights(mesh, copy):
-        return False
-    mine, its = mesh_io.read_group_weights(mesh), weights_of(copy)
-    # NaN equals nothing.
-    if replace(mine, weights=its.weights).equals(its) and np.array_equal(
-        mine.weights, its.weights, equal_nan=True
-    ):
-        return True
-    _newer_weights[copy.session_uid] = mine
-    return False
+    return all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True)) and all(
+        np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
+        for mine, its in zip(_arrays(mesh), _arrays(copy), strict=True)
+    )
 
 
-def is_good_copy(mesh: bpy.types.Mesh, copy: bpy.types.Mesh, old_copy: int) -> bool:
-    """The same for a copy that was just made of the mesh. Only the first one of each mesh is compared.
-
-    old_copy  the session_uid of the one that it replaces; 0 for none
-    """
-    _weights.pop(old_copy, None)
-    if old_copy in _newer_weights:
-        _weights[copy.session_uid] = _newer_weights.pop(old_copy)
-    if mesh.session_uid not in _copied_well and _are_alike_but_for_weights(mesh, copy):
+def is_good_copy(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
+    """The same for a copy that was just made of the mesh. Only the first one of each mesh is compared."""
+    if mesh.session_uid not in _copied_well and are_alike(mesh, copy):
         _copied_well.add(mesh.session_uid)
     return mesh.session_uid in _copied_well
 
 
 # The session_uid of meshes that equalled a copy.
 _copied_well: set[int] = set()
-# The weights of copies, by session_uid. Nobody changes them, and reading them takes longer than all else.
-_weights: dict[int, GroupWeights] = {}
-# Those of the mesh that was compared last, by the session_uid of its copy, if they are all that differs. The
-# next copy has them.
-_newer_weights: dict[int, GroupWeights] = {}
-
-
-def weights_of(copy: bpy.types.Mesh) -> GroupWeights:
-    """Returns the weights of a copy, which are read once."""
-    if copy.session_uid not in _weights:
-        if len(_weights) > 15:
-            _weights.clear()
-        _weights[copy.session_uid] = mesh_io.read_group_weights(copy)
-    return _weights[copy.session_uid]
-
-
-def _are_alike_but_for_weights(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
-    return all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True)) and all(
-        np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
-        for mine, its in zip(_arrays(mesh), _arrays(copy), strict=True)
-    )
 
 
 def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:
@@ -101,7 +65,9 @@ def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:
 
 
 def _arrays(mesh: bpy.types.Mesh) -> Iterator[np.ndarray]:
-    yield read(mesh.polygons, "loop_start", kind=np.int32)
+    yield mesh_io.read_face_offsets(mesh)
+    weights = mesh_io.read_group_weights(mesh)
+    yield from (weights.counts, weights.groups, weights.weights)
     for attribute in mesh.attributes:
         yield _values_of(attribute)
     if mesh.has_custom_normals and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is None:

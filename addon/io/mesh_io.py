@@ -104,11 +104,12 @@ def read_topology(mesh: bpy.types.Mesh) -> Topology:
         edges = read(of_edges.data, "value", 2, np.int32)
     else:
         corners, edges = corner_vertices(mesh), read(mesh.edges, "vertices", 2, np.int32)
-    return Topology(_read_face_offsets(mesh.polygons, len(corners)), corners, edges)
+    return Topology(read_face_offsets(mesh), corners, edges)
 
 
-def _read_face_offsets(faces: bpy.types.MeshPolygons, corners: int) -> np.ndarray:
+def read_face_offsets(mesh: bpy.types.Mesh) -> np.ndarray:
     """Returns int32 [faces + 1]: the first corner of each face, then the end."""
+    faces, corners = mesh.polygons, len(mesh.loops)
     count = len(faces)
     # A face is its offset in Blender's array (4.0 to 5.3). "loop_start" takes a hundred times as long.
     first = faces[0].as_pointer() if count else 0

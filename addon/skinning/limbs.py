@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from math import sqrt
 from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
@@ -37,6 +38,11 @@ STRAIGHT = np.cos(np.radians(45.0))
 ALIKE = np.cos(np.radians(15.0))
 # Skin whose middle is nearer to the head than so much of its spread is around it, and tells no direction.
 AROUND = 0.5
+
+
+def _length(vector: np.ndarray) -> float:
+    """That of one vector, in a fifth of the time of numpy's."""
+    return sqrt(vector @ vector)
 
 
 def words_of(name: str) -> str:
@@ -104,23 +110,23 @@ class _Finder:
 
     def _to_joint(self, bone: int) -> np.ndarray | None:
         own, name, joints = self._own[bone], words_of(self._bones.names[bone]), []
-        size = np.linalg.norm(own)
+        size = _length(own)
         for child in self._bones.children[bone]:
             of_child, way = words_of(self._bones.names[child]), self._heads[child] - self._heads[bone]
             is_helper = re.search(OWN_TWIST, of_child) or re.match(MADE, of_child)
-            if not is_helper and np.linalg.norm(way) > 1e-3 * size:
+            if not is_helper and _length(way) > 1e-3 * size:
                 joints.append(way)
-        nearest = min(joints, key=lambda joint: float(np.linalg.norm(joint - own)), default=None)
-        if nearest is None or np.linalg.norm(nearest - own) <= NEAR * size or len(joints) == 1:
+        nearest = min(joints, key=lambda joint: _length(joint - own), default=None)
+        if nearest is None or _length(nearest - own) <= NEAR * size or len(joints) == 1:
             return nearest
         # Others, as of muscles, start on the way.
         is_limb = re.search(f"{UPPER}|{LOWER}|{ARM}|{LEG}", name)
-        return max(joints, key=lambda joint: float(np.linalg.norm(joint))) if is_limb else None
+        return max(joints, key=lambda joint: _length(joint)) if is_limb else None
 
     def _is_no_limb(self, bone: int) -> bool:
         """Whether what it carries elsewhere than at its tail need not be its end, as the jaw of a head."""
         joint, own = self._joints[bone], self._own[bone]
-        is_elsewhere = joint is not None and np.linalg.norm(joint - own) > NEAR * np.linalg.norm(own)
+        is_elsewhere = joint is not None and _length(joint - own) > NEAR * _length(own)
         return bool(is_elsewhere and re.search(rf"(?<![a-z])({NEITHER})", words_of(self._bones.names[bone])))
 
     def _are_most_across(self, bone: int) -> bool:
@@ -154,7 +160,7 @@ class _Finder:
     def _as(self, other: int, bone: int) -> np.ndarray:
         """The direction of a bone's limb if the bone stands to it as another does to its own."""
         way = self._axes[bone] @ np.linalg.pinv(self._axes[other]) @ self._joints[other]
-        return way / np.linalg.norm(way)
+        return way / _length(way)
 
     def _to_skin(self, bone: int) -> np.ndarray | None:
         """From the bone's head through the middle of its skin to the end."""
@@ -164,8 +170,8 @@ class _Finder:
         *middle, square = skin[bone, :4] / skin[bone, 4]
         way = np.array(middle) - self._heads[bone]
         spread = np.sqrt(max(square - np.square(middle).sum(), 0.0))
-        return 2.0 * way if np.linalg.norm(way) > AROUND * spread else None
+        return 2.0 * way if _length(way) > AROUND * spread else None
 
     def _is_across(self, bone: int, limb: np.ndarray) -> bool:
         own = self._own[bone]
-        return bool(own @ limb < STRAIGHT * np.linalg.norm(own) * np.linalg.norm(limb))
+        return bool(own @ limb < STRAIGHT * _length(own) * _length(limb))

@@ -8,6 +8,7 @@ from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
+import sinew
 
 from ..base.phrases import phrase
 from .arrays import OfArrays
@@ -91,7 +92,7 @@ class Bones(OfArrays):
     @cached_property
     def rest_from_armature(self) -> np.ndarray:
         """float64 [bones + joints, 4, 4]: the inverses of `rest`."""
-        return np.linalg.inv(self.rest.astype(np.float64))
+        return sinew.affine.inverse(self.rest.astype(np.float64))
 
     @cached_property
     def limbs(self) -> Limbs:

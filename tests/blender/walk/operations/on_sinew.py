@@ -7,7 +7,7 @@ import random
 
 import bpy
 from walk_sides import METHODS, OF_BLENDER, STAGES, animated_paths, armature_modifiers
-from walker import FRAMES, Walker, and_undo, operation
+from walker import FRAMES, Walker, and_undo, operation, some_vertices
 
 # --- Sinew
 
@@ -70,6 +70,40 @@ def remove_all(w: Walker, r: random.Random) -> None:
 def method(w: Walker, r: random.Random) -> None:
     obj, name = w.mesh(r, lambda o: w.side.has_sinew(o) and not w.side.is_method_keyed(o)), _method(r)
     w.side.set_method(obj, name)
+
+
+@operation(3)
+def edit_between_methods(w: Walker, r: random.Random) -> None:
+    """All at once, as by a script: an edit that leaves every count as it is, before or between choices."""
+    obj = w.mesh(
+        r,
+        lambda o: (
+            w.side.has_sinew(o)
+            and not w.side.is_method_keyed(o)
+            and o.mode == "OBJECT"
+            and not o.data.is_editmode
+            and o.data.library is None
+            and o.override_library is None
+            and len(o.data.vertices) > 0
+        ),
+    )
+    names, what = (_method(r), _method(r)), r.choice(("points", "weights", "mesh", "nothing"))
+    if r.random() < 0.5:
+        w.side.set_method(obj, names[0])
+    mesh, vertices = obj.data, some_vertices(w, r, obj)
+    if what == "mesh":
+        mesh = obj.data.copy()
+        mesh.name = w.new_name("mesh")
+    if what in ("points", "mesh"):
+        for index in vertices:
+            mesh.vertices[index].co.x += r.uniform(-0.1, 0.1)
+        mesh.update()
+        obj.data = mesh
+    elif what == "weights" and obj.vertex_groups:
+        w.one(r, obj.vertex_groups).add(vertices, r.uniform(0.0, 1.0), "REPLACE")
+        if not obj.visible_get():
+            mesh.update()
+    w.side.set_method(obj, names[1])
 
 
 @operation(5)
