@@ -11,6 +11,7 @@ import numpy as np
 
 from ..io import mesh_io
 from . import (
+    layout,
     node_group,
     point_buffer,
     pose_driver,
@@ -177,13 +178,13 @@ def remove(obj: bpy.types.Object) -> None:
 
 def clear_references(obj: bpy.types.Object) -> None:
     """Clears all references to what Sinew made (references.py); ensure() makes them again."""
-    nodes = stack.sinew_modifier(obj)
+    now = layout.read(obj)
+    nodes, mark = obj.modifiers.get(now.sinew), obj.modifiers.get(now.mark)
     pose_driver.remove(obj)
     _forget_helpers(obj)
     if nodes is not None and nodes.node_group is not None:
         node_group.forget_helpers(nodes)
         nodes.node_group = None
-    mark = stack.mark_modifier(obj)
     if mark is not None:
         mark.node_group = None
 

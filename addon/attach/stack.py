@@ -15,21 +15,6 @@ def sinew_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
     return obj.modifiers.get(layout.read(obj).sinew)
 
 
-def neutral_modifier(obj: bpy.types.Object) -> bpy.types.LaplacianDeformModifier | None:
-    """Returns Sinew's modifier that changes nothing (undeformed.py)."""
-    return obj.modifiers.get(layout.read(obj).neutral)
-
-
-def mark_modifier(obj: bpy.types.Object) -> bpy.types.NodesModifier | None:
-    """Returns Sinew's modifier that marks the mesh (undeformed.py)."""
-    return obj.modifiers.get(layout.read(obj).mark)
-
-
-def own_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
-    """Returns the modifiers that Sinew put on the object, in their order."""
-    return [obj.modifiers[name] for name in layout.read(obj).own]
-
-
 def helping_modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Returns those of Sinew's modifiers that change nothing (undeformed.py)."""
     return [obj.modifiers[name] for name in layout.read(obj).helping]

@@ -12,7 +12,7 @@ from typing import ClassVar
 import bpy
 import numpy as np
 from mathutils import Quaternion, Vector
-from sinew_addon.attach import attach, node_group, properties, stack
+from sinew_addon.attach import attach, layout, node_group, properties
 from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.deform import session
 from sinew_addon.features.measure import live
@@ -122,9 +122,19 @@ def key_shape(obj: bpy.types.Object, scale: tuple[float, float, float] | None = 
     key(made, "value", ((1, 0.0), (11, 1.0)))
 
 
+def mark(obj: bpy.types.Object) -> bpy.types.Modifier | None:
+    """Sinew's modifier that marks the mesh (attach/undeformed.py)."""
+    return obj.modifiers.get(layout.read(obj).mark)
+
+
+def neutral(obj: bpy.types.Object) -> bpy.types.Modifier | None:
+    """The one that changes nothing."""
+    return obj.modifiers.get(layout.read(obj).neutral)
+
+
 def modifiers(obj: bpy.types.Object) -> list[bpy.types.Modifier]:
     """Its modifiers without those that keep texture coordinates (attach/undeformed.py)."""
-    own = (stack.mark_modifier(obj), stack.neutral_modifier(obj))
+    own = (mark(obj), neutral(obj))
     return [modifier for modifier in obj.modifiers if modifier not in own]
 
 

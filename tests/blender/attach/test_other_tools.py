@@ -16,7 +16,7 @@ import scenes
 import sinew_addon
 from conftest import halved
 from five_meshes import select as make_active
-from sinew_addon.attach import other_tools, properties, stack
+from sinew_addon.attach import layout, other_tools, properties
 from sinew_addon.deform import safe_mode
 from sinew_addon.jobs.tasks import preflight
 
@@ -79,7 +79,7 @@ def seen_of(obj: bpy.types.Object, name: str = "") -> Seen:
     """The mesh itself, its shape in this pose, weights, shape keys and modifiers but for Sinew's."""
     bpy.context.view_layer.update()
     keys = keys_of(obj)
-    own = stack.own_modifiers(obj) if properties.has_sinew(obj) else []
+    own = [obj.modifiers[name] for name in layout.read(obj).own] if properties.has_sinew(obj) else []
     left = [m for m in obj.modifiers if m not in own]
     weights = [[round(group.weight, 4) for group in vertex.groups] for vertex in obj.data.vertices]
     return {

@@ -181,9 +181,9 @@ def test_the_mark_that_somebody_applied_is_made_again(rendered):
     obj, _armature = scenes.make_arm()
     expected = rendered(obj)
     scenes.add_sinew(obj, "lbs")
-    bpy.ops.object.modifier_apply(modifier=stack.mark_modifier(obj).name)
+    bpy.ops.object.modifier_apply(modifier=scenes.mark(obj).name)
     _assert_same(rendered(obj), expected)
-    assert stack.mark_modifier(obj) is not None
+    assert scenes.mark(obj) is not None
     assert node_group.IN_STACK not in obj.data.attributes
 
 
@@ -202,11 +202,11 @@ def test_the_modifier_is_made_again_and_follows(rendered):
     obj, _armature = scenes.make_arm()
     expected = rendered(obj)
     scenes.add_sinew(obj, "lbs")
-    obj.modifiers.remove(stack.neutral_modifier(obj))
+    obj.modifiers.remove(scenes.neutral(obj))
     _assert_same(rendered(obj), expected)
-    obj.modifiers.remove(stack.mark_modifier(obj))
+    obj.modifiers.remove(scenes.mark(obj))
     _assert_same(rendered(obj), expected)
-    mark, neutral = stack.mark_modifier(obj), stack.neutral_modifier(obj)
+    mark, neutral = scenes.mark(obj), scenes.neutral(obj)
     mark.name, neutral.name = "First", "Renamed"
     behind = obj.modifiers.new("Behind", "CAST")
     behind.show_viewport = behind.show_render = False

@@ -166,7 +166,7 @@ class SinewSide(Side):
                 raise ValueError(f"{obj.name}: nothing says that {rig.name} is gone")
 
     def check_warned(self, obj: bpy.types.Object, modifier: bpy.types.ParticleSystemModifier) -> None:
-        own = stack.own_modifiers(obj)
+        own = [obj.modifiers[name] for name in layout.read(obj).own]
         others = {each.type for each in obj.modifiers if each != modifier and each not in own}
         if self.has_sinew(obj) and others == {"ARMATURE"}:
             is_warned = any(text.startswith(f"{modifier.name}: ") for text in other_tools.warnings(obj))

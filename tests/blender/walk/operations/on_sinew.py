@@ -18,9 +18,14 @@ def _method(r: random.Random) -> str:
 
 
 def _is_behind_hair(obj: bpy.types.Object) -> bool:
-    """Sinew refuses this."""
+    """Sinew refuses hair in front of the first Armature modifier with an armature, preferably one that is on.
+    Where that is animated, which one that is can not be told."""
     kinds = [modifier.type for modifier in obj.modifiers]
-    return "PARTICLE_SYSTEM" in kinds[: kinds.index("ARMATURE")]
+    found = [(m, n) for n, m in enumerate(obj.modifiers) if m.type == "ARMATURE" and m.object is not None]
+    is_on = [m.show_viewport or m.show_render for m, _number in found]
+    is_told = not any(".show_" in path for path in animated_paths(obj))
+    chosen = found[is_on.index(True) if True in is_on else 0] if is_told else found[-1]
+    return "PARTICLE_SYSTEM" in kinds[: chosen[1]]
 
 
 @operation(6)
