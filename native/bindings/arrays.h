@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "gil.h"
 #include "signatures.h"
 #include "sinew/transform/affine.h"
 
@@ -126,9 +127,10 @@ py::array_t<float> checked_points(const py::handle& value, const char* argument)
 /// The same, n = `count`.
 py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count);
 
-/// Raises for what set_rest_points() did not take: ValueError for points [n, 3] or their space, else MemoryError.
-[[noreturn]] void refuse_rest_points(const py::array_t<float>& points, std::size_t count,
-                                     const Affine<float>& bones_from_model = {});
+/// Raises what the status of a set_rest_points() says of its points [n, 3], of which there are to be `count`, and of
+/// their space.
+void check_rest_points(Status status, const py::array_t<float>& points, std::size_t count,
+                       const Affine<float>& bones_from_model = {});
 
 /// An array [n, 4, 4] or [n, 3, 4], row-major, finite. A fourth row is not read.
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument);

@@ -335,9 +335,9 @@ py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone
 void set_rest_points(Timed<Deformer>& deformer, const ArrayLike& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
     // May have to wait for another thread's deformation.
-    bool is_set = false;
-    without_gil([&] { is_set = deformer.set_rest_points(as_points(points)); });
-    if (!is_set) refuse_rest_points(points, deformer.vertex_count());
+    Status status{};
+    without_gil([&] { status = deformer.set_rest_points(as_points(points)); });
+    check_rest_points(status, points, deformer.vertex_count());
 }
 
 }  // namespace

@@ -104,16 +104,17 @@ std::vector<float> Deformer::mix_weights() const {
     return unpack_values(state_->packed->mesh, state_->mix->weights, vertex_count());
 }
 
-bool Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) noexcept {
-    if (!are_points(rest_points, vertex_count())) return false;
+Status Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) noexcept {
+    const Status status = status_of_points(rest_points, vertex_count());
+    if (status != Status::ok) return status;
     const PaletteStore::Writing writing(state_->palettes);
     return set_own_points(state_->packed->mesh, rest_points, state_->own_rest_points);
 }
 
-bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+Status Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                       std::span<Vec3<float>> points) const noexcept {
     const PackedBinding& packed = *state_->packed;
-    if (points.size() != packed.vertex_count) return false;
+    if (points.size() != packed.vertex_count) return Status::size;
     const PaletteStore::Reading reading(state_->palettes);
     const Bones bones{packed.mesh.used_bones,   packed.stretched_bones, posed_from_rest,  packed.rest_bones,
                       options.bones_from_model, &state_->sets,          options.rotations};
@@ -143,7 +144,7 @@ bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const Defo
             state_->kernels[0]->deform[target_in_use()](frames[0], begin, end);
         }
     });
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/binding.h"
 
 namespace sinew {
@@ -61,9 +62,8 @@ public:
     [[nodiscard]] std::vector<float> mix_weights() const;
 
     /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Each result of a
-    /// concurrent deform() has either the old points or the new ones. The first call allocates
-    /// memory for them. Returns whether the size fits, all are finite and there is memory: else nothing changes.
-    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points) noexcept;
+    /// concurrent deform() has either the old points or the new ones. The first call allocates memory for them.
+    Status set_rest_points(std::span<const Vec3<float>> rest_points) noexcept;
 
     /// Writes the deformed points, model space.
     ///
@@ -71,7 +71,7 @@ public:
     /// points           [vertices]
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest.
-    [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+    Status deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                               std::span<Vec3<float>> points) const noexcept;
 
 private:

@@ -50,7 +50,7 @@ public:
     /// tangents         [frames], or empty; empty if there are none at rest
     ///
     /// A vertex without influences keeps its normals and tangents.
-    [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+    Status deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                               std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
                               std::span<Vec3<float>> tangents = {}) const noexcept;
 
@@ -59,7 +59,7 @@ public:
     ///
     /// points   [vertices] as written by deform() or by the Deformer
     /// normals  [frames]
-    [[nodiscard]] bool deform_normals(std::span<const Affine<float>> posed_from_rest,
+    Status deform_normals(std::span<const Affine<float>> posed_from_rest,
                                       const DeformOptions& options, std::span<const Vec3<float>> points,
                                       std::span<Vec3<float>> normals) const noexcept;
 

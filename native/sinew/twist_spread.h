@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
@@ -45,9 +46,10 @@ public:
     TwistSpread(const Binding& binding, const TwistSpreadData& data);
 
     /// Sets other rest points [vertices], or the same points with another bones_from_model. The first call
-    /// allocates memory for them. Returns whether the size fits, all are finite, the transform has an inverse and there
-    /// is memory: else nothing changes.
-    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points,
+    /// allocates memory for them.
+    ///
+    /// bones_from_model  invertible
+    Status set_rest_points(std::span<const Vec3<float>> rest_points,
                                        const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
@@ -65,7 +67,7 @@ public:
     /// posed_from_rest  [bones] finite; missing bones stay at rest
     ///
     /// Where no bone is twisted, no bit changes.
-    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+    Status apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                              const TwistSpreadOptions& options = {}) const noexcept;
 
 private:

@@ -201,7 +201,7 @@ template std::vector<Influence<double>> normalised_influences_of<double>(const S
 std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
                                   const DeformOptions& options) {
     std::vector<Vec3<float>> points(deformer.vertex_count(), Vec3<float>(-1e9f));
-    EXPECT_TRUE(deformer.deform(scene.posed_from_rest, options, points));
+    EXPECT_EQ(deformer.deform(scene.posed_from_rest, options, points), Status::ok);
     return points;
 }
 

@@ -109,8 +109,8 @@ struct BoneSets {
                               std::span<const std::int32_t> more_bones = {});
 
 /// Packs other rest points [vertices] in the form of PackedMesh::rest_points, into memory that the first call
-/// allocates. Returns false without memory: nothing is changed then.
-[[nodiscard]] bool set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+/// allocates.
+Status set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
                                   std::vector<Lanes<float>>& packed) noexcept;
 
 /// The form of PackedMesh::rest_points for rest points [vertices].

@@ -73,23 +73,24 @@ struct SkinnedNormals::State {
             std::vector<Vec3<float>> stepped = points;
             for (Vec3<float>& point : stepped) point[axis] += step;
             const auto i = static_cast<std::size_t>(axis);
-            if (!are_points(stepped, points.size())) {
-                fail("rest_points", "finite values", "infinity beside them");
+            switch (deformers[1 + i].set_rest_points(stepped)) {
+                case Status::memory: throw std::bad_alloc();
+                case Status::not_finite: fail("rest_points", "finite values", "infinity beside them");
+                default: break;
             }
-            if (!deformers[1 + i].set_rest_points(stepped)) throw std::bad_alloc();
             moved[i].resize(points.size());
             if (!vertices.empty()) cofactors[i].resize(points.size());
         }
     }
 
     /// Deforms the rest points displaced by a step along each axis.
-    [[nodiscard]] bool move_steps(std::span<const Affine<float>> posed_from_rest,
+    Status move_steps(std::span<const Affine<float>> posed_from_rest,
                                   const DeformOptions& options) const noexcept {
-        bool are_moved = true;
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            are_moved = deformers[1 + axis].deform(posed_from_rest, options, moved[axis]) && are_moved;
+            const Status status = deformers[1 + axis].deform(posed_from_rest, options, moved[axis]);
+            if (status != Status::ok) return status;
         }
-        return are_moved;
+        return Status::ok;
     }
 
     void move_normals(std::span<const Vec3<float>> points, std::span<Vec3<float>> to,
@@ -144,35 +145,37 @@ std::size_t SkinnedNormals::frame_count() const noexcept { return state_->normal
 bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.empty(); }
 const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformers[0]; }
 
-bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
+Status SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
                             std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
                             std::span<Vec3<float>> tangents) const noexcept {
     const State& state = *state_;
     const std::size_t most_tangents = state.tangents.size();
-    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
-    if (!tangents.empty() && tangents.size() != most_tangents) return false;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return Status::size;
+    if (!tangents.empty() && tangents.size() != most_tangents) return Status::size;
     const std::scoped_lock lock(state.mutex);
-    if (!state.deformers[0].deform(posed_from_rest, options, points)) return false;
-    if (!state.move_steps(posed_from_rest, options)) return false;
+    Status status = state.deformers[0].deform(posed_from_rest, options, points);
+    if (status == Status::ok) status = state.move_steps(posed_from_rest, options);
+    if (status != Status::ok) return status;
     state.move_normals(points, normals, options.threads);
-    if (tangents.empty()) return true;
+    if (tangents.empty()) return Status::ok;
     const auto part = [&](std::size_t begin, std::size_t end) {
         state.move_tangents(points, tangents, begin, end);
     };
     parallel_for(tangents.size(), useful_threads(options.threads, tangents.size(), kFramesWorthAThread),
                  part);
-    return true;
+    return Status::ok;
 }
 
-bool SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
+Status SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
                                     const DeformOptions& options, std::span<const Vec3<float>> points,
                                     std::span<Vec3<float>> normals) const noexcept {
     const State& state = *state_;
-    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return Status::size;
     const std::scoped_lock lock(state.mutex);
-    if (!state.move_steps(posed_from_rest, options)) return false;
+    const Status status = state.move_steps(posed_from_rest, options);
+    if (status != Status::ok) return status;
     state.move_normals(points, normals, options.threads);
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

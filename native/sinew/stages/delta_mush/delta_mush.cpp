@@ -260,10 +260,10 @@ std::size_t DeltaMush::iterations() const noexcept {
     return state_->bound->iterations;
 }
 
-bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
+Status DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
     const State& state = *state_;
     const MushMesh& mesh = state.mesh;
-    if (points.size() != mesh.vertices.size()) return false;
+    if (points.size() != mesh.vertices.size()) return Status::size;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
     // Read once, because the compiler assumes that any stored number may change it.
@@ -286,7 +286,7 @@ bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
         kMushKernel.finish[target_in_use()](frame, begin, end);
     };
     parallel_for(mesh.chunk_count(), threads, finish, 1);
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew
