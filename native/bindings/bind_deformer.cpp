@@ -311,10 +311,11 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
         const auto of_bones = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
         arguments.rotations =
             continued_rotations(Skeleton(as_span(of_bones)), arguments.bones, checked_turns(turns));
-        options.rotations = arguments.rotations;
+        arguments.pose.rotations = arguments.rotations;
     }
-    options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
-    check_space(options.bones_from_model);
+    arguments.pose.posed_from_rest = arguments.bones;
+    arguments.pose.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
+    check_space(arguments.pose.bones_from_model);
     return arguments;
 }
 
@@ -328,7 +329,7 @@ py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone
                                                      rest_inverses, parameters, parents, turns);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const auto to = as_points_to_write(points);
-    deformer.call([&] { return deformer.deform(arguments.bones, arguments.options, to); });
+    deformer.call([&] { return deformer.deform(arguments.pose, arguments.options, to); });
     return points;
 }
 

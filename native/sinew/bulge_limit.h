@@ -9,6 +9,7 @@
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
+#include "sinew/pose.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 namespace sinew {
@@ -46,11 +47,11 @@ public:
 
     /// Limits the points in place.
     ///
-    /// points           [vertices] deformed, model space
-    /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
+    /// points  [vertices] deformed, model space
+    /// pose    only its bones are read: the space is that of the rest points
     ///
     /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
-    Status apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+    Status apply(std::span<Vec3<float>> points, const Pose& pose,
                              const BulgeLimitOptions& options = {}) const noexcept;
 
 private:

@@ -10,6 +10,7 @@
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
+#include "sinew/pose.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
 
 namespace sinew {
@@ -63,11 +64,11 @@ public:
 
     /// Spreads the twists in place.
     ///
-    /// points           [vertices] deformed, model space
-    /// posed_from_rest  [bones] finite; missing bones stay at rest
+    /// points  [vertices] deformed, model space
+    /// pose    only its bones are read: the space is that of the rest points
     ///
     /// Where no bone is twisted, no bit changes.
-    Status apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
+    Status apply(std::span<Vec3<float>> points, const Pose& pose,
                              const TwistSpreadOptions& options = {}) const noexcept;
 
 private:

@@ -173,8 +173,8 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     const auto frames = [&](std::vector<Vec3<float>>& points) {
         for (Deformer& deformer : deformers) {
             for (const std::size_t threads : {1, 4, 0}) {
-                EXPECT_EQ(deformer.deform(scene.posed_from_rest, {{}, threads}, points), Status::ok);
-                EXPECT_EQ(deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points), Status::ok);
+                EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {threads}, points), Status::ok);
+                EXPECT_EQ(deformer.deform({scene.posed_from_rest, bones_from_model}, {threads}, points), Status::ok);
             }
             EXPECT_EQ(deformer.set_rest_points(other_rest_points), Status::ok);
         }
@@ -247,8 +247,8 @@ TEST(Stages, allocate_nothing_once_rest_points_were_set) {
     const auto frame = [&] {
         EXPECT_EQ(limit.set_rest_points(scene.rest_points), Status::ok);
         EXPECT_EQ(spread.set_rest_points(scene.rest_points), Status::ok);
-        EXPECT_EQ(spread.apply(points, scene.posed_from_rest, {}), Status::ok);
-        EXPECT_EQ(limit.apply(points, scene.posed_from_rest, {}), Status::ok);
+        EXPECT_EQ(spread.apply(points, {scene.posed_from_rest}, {}), Status::ok);
+        EXPECT_EQ(limit.apply(points, {scene.posed_from_rest}, {}), Status::ok);
     };
     frame();
     const int before = allocations;
@@ -274,7 +274,7 @@ TEST(Memory, comes_from_operator_new) {
         for (const MethodInfo& method : kMethods) {
             Deformer deformer(binding, method);
             EXPECT_EQ(deformer.set_rest_points(scene.rest_points), Status::ok);
-            EXPECT_EQ(deformer.deform(scene.posed_from_rest, {{}, 4}, points), Status::ok);
+            EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {4}, points), Status::ok);
         }
         const DeltaMush mush(mesh.topology(), mesh.rest_points, {});
         const Normals normals(mesh.topology(), mesh.rest_points.size(), {});
@@ -313,7 +313,7 @@ TEST(DeltaMush, and_normals_allocate_nothing_once_they_are_made) {
         options.threads = threads;
         int before = allocations;
         EXPECT_EQ(mush.apply(mesh.rest_points, 1.0f, threads), Status::ok);
-        EXPECT_EQ(skinned.deform(scene.posed_from_rest, options, points, moved, tangents), Status::ok);
+        EXPECT_EQ(skinned.deform({scene.posed_from_rest}, options, points, moved, tangents), Status::ok);
         EXPECT_EQ(allocations, before);
         for (const NormalDomain domain : {NormalDomain::vertex, NormalDomain::corner, NormalDomain::face}) {
             std::vector<Vec3<float>> result(normals.count(domain));

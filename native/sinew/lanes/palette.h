@@ -9,6 +9,7 @@
 #include <span>
 
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/pose.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
@@ -64,11 +65,9 @@ struct Bones {
     std::span<const std::int32_t> used;  // their numbers in the pose
     // indices into `used` of those whose rest axes do not have unit length
     std::span<const std::int32_t> stretched;
-    std::span<const Affine<float>> posed_from_rest;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
-    Affine<float> bones_from_model;
-    const BoneSets* sets;                    // empty unless a kernel has rows for sets
-    std::span<const Quat<float>> rotations;  // DeformOptions::rotations
+    const BoneSets* sets;                       // empty unless a kernel has rows for sets
+    Pose pose;
 
     /// Orthonormal, for an index into `used`.
     [[nodiscard]] Affine<double> rest_bone(std::size_t bone) const noexcept {
@@ -113,7 +112,7 @@ struct Spaces {
     const float* model_from_bones = nullptr;
 };
 
-/// These rows.
+/// Owns the rows that Spaces points to.
 class SpaceRows {
 public:
     /// bones_from_model  invertible

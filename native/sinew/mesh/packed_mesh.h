@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sinew/base/status.h"
 #include "sinew/base/thread_pool.h"
 #include "sinew/mesh/influence.h"
 #include "sinew/transform/affine.h"

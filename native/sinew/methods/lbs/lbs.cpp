@@ -313,7 +313,7 @@ void rows_in_model(const Bones& bones, Palette& palette) {
     // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     for (std::size_t i = 0; i < used.size(); ++i) {
-        const float* const from = &bones.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+        const float* const from = &bones.pose.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
         float* const to = palette.bones[kLbsColumns * i].value.data();
         auto squares = hn::Zero(d);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -339,7 +339,7 @@ void rows_in_model(const Bones& bones, Palette& palette) { linear_rows_between_s
 #endif
 
 void bone_rows(const Bones& bones, Palette& palette) {
-    is_identity(bones.bones_from_model) ? rows_in_model(bones, palette)
+    is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
                                         : linear_rows_between_spaces(bones, palette);
 }
 
@@ -354,10 +354,10 @@ namespace sinew {
 static constexpr Float4 kRestRow[HWY_NAMESPACE::kLbsColumns] = {};
 
 void linear_rows_between_spaces(const Bones& bones, Palette& palette) {
-    const auto bones_from_model = cast<double>(bones.bones_from_model);
+    const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
     const Affine<double> model_from_bones = inverse(bones_from_model);
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
-        const Affine<float>& posed = bones.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
+        const Affine<float>& posed = bones.pose.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
         const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
         const Mat3<double> m = motion.linear - Mat3<double>(1.0);
         Float4* const columns = &palette.bones[std::size(kRestRow) * i];

@@ -104,8 +104,8 @@ Status BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }
 std::size_t BulgeLimit::bone_count() const noexcept { return state_->packed->bone_count; }
 
-Status BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-                       const BulgeLimitOptions& options) const noexcept {
+Status BulgeLimit::apply(std::span<Vec3<float>> points, const Pose& pose,
+                         const BulgeLimitOptions& options) const noexcept {
     const State& state = *state_;
     if (points.size() != vertex_count()) return Status::size;
     const std::scoped_lock lock(state.mutex);
@@ -115,7 +115,7 @@ Status BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<f
                                        Vec3<double>(state.segments[i].tail)};
         const auto number = static_cast<std::size_t>(state.mesh.used_bones[i]);
         Affine<double> motion{};
-        if (number < posed_from_rest.size()) motion = cast<double>(posed_from_rest[number]);
+        if (number < pose.posed_from_rest.size()) motion = cast<double>(pose.posed_from_rest[number]);
         const double stretch =
             is_orthonormal(motion.linear) ? 1.0 : BulgeLimitStage::stretch(motion.linear, rest);
         is_stretched = is_stretched || stretch != 1.0;

@@ -294,8 +294,8 @@ std::vector<float> TwistSpread::angles(std::span<const Affine<float>> posed_from
     return angles;
 }
 
-Status TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-                        const TwistSpreadOptions& options) const noexcept {
+Status TwistSpread::apply(std::span<Vec3<float>> points, const Pose& pose,
+                          const TwistSpreadOptions& options) const noexcept {
     const State& state = *state_;
     const auto fits = [&](std::size_t size) { return size == 0 || size == state.twists.size(); };
     if (points.size() != vertex_count() || !fits(options.amounts.size()) || !fits(options.curves.size()) ||
@@ -307,7 +307,7 @@ Status TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<
     frame.blend = options.blend;
     frame.mix_blend = state.mix.empty() ? options.blend : options.mix_blend;
     frame.is_linear = frame.blend == TwistBlend::linear && frame.mix_blend == TwistBlend::linear;
-    if (!state.prepare(posed_from_rest, options, frame.is_linear)) return Status::ok;
+    if (!state.prepare(pose.posed_from_rest, options, frame.is_linear)) return Status::ok;
     const auto goes_short = [](TwistBlend blend) {
         return blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
     };
