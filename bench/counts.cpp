@@ -95,9 +95,8 @@ int main() {
         const std::string of = std::string("/") + kKindNames[static_cast<int>(kind)];
         for (const MethodInfo& method : kMethods) {
             const Deformer deformer(scene.data_for(method), method);
-            count(std::string(method.name) + of, [&] {
-                (void)deformer.deform({scene.pose}, {1}, scene.points);
-            });
+            count(std::string(method.name) + of,
+                  [&] { (void)deformer.deform({scene.pose}, {1}, scene.points); });
             for (const Variant& variant : variants_of(method)) {
                 count(variant.name + of,
                       [&] { (void)deformer.deform({scene.pose}, variant.options(), scene.points); });
@@ -110,9 +109,8 @@ int main() {
     Scene bones = make_scene({Kind::chain, 1000, 1000, 1});
     for (const MethodInfo& method : kMethods) {
         const Deformer deformer(bones.data_for(method), method);
-        count(std::string(method.name) + "/bones", [&] {
-            (void)deformer.deform({bones.pose}, {1}, bones.points);
-        });
+        count(std::string(method.name) + "/bones",
+              [&] { (void)deformer.deform({bones.pose}, {1}, bones.points); });
     }
     return 0;
 }

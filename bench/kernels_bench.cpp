@@ -149,9 +149,8 @@ void register_all() {
             for_each_method([&]<class Method>(Method) {
                 const std::string of = "/" + std::string(Method::info.name) + scene;
                 for (const std::size_t threads : {1, 2}) {
-                    add("sinew" + std::to_string(threads) + of, [=](benchmark::State& s) {
-                        ours(s, Method::info, shape, {threads});
-                    });
+                    add("sinew" + std::to_string(threads) + of,
+                        [=](benchmark::State& s) { ours(s, Method::info, shape, {threads}); });
                 }
                 for (const Variant& variant : variants_of(Method::info)) {
                     add("sinew1/" + variant.name + scene,
@@ -181,9 +180,7 @@ void register_all() {
     const auto add_cost = [](const std::string& influences, const Shape& shape) {
         for (const MethodInfo& method : kMethods) {
             add("cost/" + std::string(method.name) + "/" + influences + "/" + std::to_string(shape.bones),
-                [=](benchmark::State& s) {
-                    ours(s, method, shape, {1});
-                });
+                [=](benchmark::State& s) { ours(s, method, shape, {1}); });
         }
     };
     for (const std::size_t bones : {10, 30, 100, 300, 1000}) {

@@ -99,7 +99,7 @@ py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_
     return has_type<T>(array) ? in_order<T>(array) : as_type<T>(array, argument, wanted);
 }
 
-/// The same with two dimensions, the second of this length.
+/// checked() with two dimensions, the second of this length.
 template <class T>
 py::array_t<T> checked_rows(const py::handle& value, const char* argument, py::ssize_t columns,
                             const std::string& wanted, std::size_t most = kAnyLength) {
@@ -124,7 +124,7 @@ py::array_t<T> one_for_each(const py::object& values, const char* argument, std:
 /// An array [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 
-/// The same, n = `count`.
+/// An array [n, 3], n = `count`.
 py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count);
 
 /// Raises what the status of a set_rest_points() says of its points [n, 3], of which there are to be `count`, and of

@@ -39,7 +39,7 @@ public:
     ///
     /// bones_from_model  invertible
     Status set_rest_points(std::span<const Vec3<float>> rest_points,
-                                       const Affine<float>& bones_from_model = {}) noexcept;
+                           const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// As Binding::bone_count().
@@ -52,7 +52,7 @@ public:
     ///
     /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
     Status apply(std::span<Vec3<float>> points, const Pose& pose,
-                             const BulgeLimitOptions& options = {}) const noexcept;
+                 const BulgeLimitOptions& options = {}) const noexcept;
 
 private:
     struct State;

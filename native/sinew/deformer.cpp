@@ -97,7 +97,8 @@ PreparedPose Deformer::State::prepare(const Pose& pose, const DeformOptions& opt
     for (std::size_t k = 0; k < kernels_in_use().size(); ++k) {
         Palette& palette = reading.palette(k);
         // Methods whose kernel can keep signs have that parameter first.
-        fill_palette(*kernels[k], packed->mesh.pairs, bones, Signs::are_kept(prepared.parameters[k]), palette);
+        fill_palette(*kernels[k], packed->mesh.pairs, bones, Signs::are_kept(prepared.parameters[k]),
+                     palette);
         prepared.palettes[k] = &palette;
     }
     return prepared;

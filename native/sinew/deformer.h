@@ -66,7 +66,8 @@ public:
     /// points  [vertices]
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest.
-    Status deform(const Pose& pose, const DeformOptions& options, std::span<Vec3<float>> points) const noexcept;
+    Status deform(const Pose& pose, const DeformOptions& options,
+                  std::span<Vec3<float>> points) const noexcept;
 
     /// For the library's own files.
     struct State;

@@ -71,8 +71,8 @@ public:
     /// normals  [count(domain)] must not overlap `points`
     ///
     /// The result does not depend on the instruction set.
-    Status compute(NormalDomain domain, std::span<const Vec3<float>> points,
-                               std::span<Vec3<float>> normals, std::size_t threads = 0) const noexcept;
+    Status compute(NormalDomain domain, std::span<const Vec3<float>> points, std::span<Vec3<float>> normals,
+                   std::size_t threads = 0) const noexcept;
 
 private:
     struct State;

@@ -28,9 +28,10 @@ struct TwistSpreadData {
 
 /// How to spread the twists of one frame.
 struct TwistSpreadOptions {
-    float amount = 1.0f;               // clamped to 0 to 1; NaN: 1
-    std::span<const float> amounts{};  // [twists] the same for each bone
-    std::span<const float> curves{};   // [twists] clamped to -1 to 1; NaN: 0
+    float amount = 1.0f;  // clamped to 0 to 1; NaN: 1
+    std::span<const float>
+        amounts{};  // [twists] further factors, one for each bone, clamped to 0 to 1; NaN: 1
+    std::span<const float> curves{};  // [twists] clamped to -1 to 1; NaN: 0
     // [twists] the channels of each tip; empty: unknown
     std::span<const TwistChannels<float>> channels{};
     TwistBlend blend = TwistBlend::linear;      // of the method that made the points
@@ -51,7 +52,7 @@ public:
     ///
     /// bones_from_model  invertible
     Status set_rest_points(std::span<const Vec3<float>> rest_points,
-                                       const Affine<float>& bones_from_model = {}) noexcept;
+                           const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// Of rest_bones. Poses have as many, or fewer.
@@ -69,7 +70,7 @@ public:
     ///
     /// Where no bone is twisted, no bit changes.
     Status apply(std::span<Vec3<float>> points, const Pose& pose,
-                             const TwistSpreadOptions& options = {}) const noexcept;
+                 const TwistSpreadOptions& options = {}) const noexcept;
 
 private:
     struct State;

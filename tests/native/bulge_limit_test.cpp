@@ -121,7 +121,8 @@ TEST(BulgeLimit, options_become_valid_and_points_of_another_number_stay) {
     const auto before = bulging(scene);
     const auto by = [&](float strength) {
         auto points = before;
-        EXPECT_EQ(limit.apply(points, {scene.posed_from_rest}, {BulgeForm::continuous, strength}), Status::ok);
+        EXPECT_EQ(limit.apply(points, {scene.posed_from_rest}, {BulgeForm::continuous, strength}),
+                  Status::ok);
         return points;
     };
     EXPECT_TRUE(by(-1.0f) == before);

@@ -113,8 +113,9 @@ TEST_P(Deform, results_have_the_old_rest_points_or_the_new) {
         readers.emplace_back([&, reader] {
             std::vector<Vec3<float>> points(scene.rest_points.size());
             while (!done) {
-                EXPECT_EQ(deformer.deform({scene.posed_from_rest},
-                                            {static_cast<std::size_t>(1 + reader % 2)}, points), Status::ok);
+                EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {static_cast<std::size_t>(1 + reader % 2)},
+                                          points),
+                          Status::ok);
                 const auto& expected = same_bits(points[0], with_old[0]) ? with_old : with_new;
                 if (!same_bits(points, expected)) ++torn;
             }

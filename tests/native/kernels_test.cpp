@@ -214,8 +214,7 @@ TEST_P(Kernels, keep_the_signs_of_a_chain) {
             // Up to 60 degrees a bone, no two of four are more than half a turn apart.
             EXPECT_EQ(difference > 0.1, degrees > 60.0) << degrees << scaled;
             if (degrees < 60.0) EXPECT_EQ(difference, 0.0);
-            const auto asked =
-                deformed(deformer, scene, {.parameters = blender}, {}, scene.rotations);
+            const auto asked = deformed(deformer, scene, {.parameters = blender}, {}, scene.rotations);
             EXPECT_TRUE(same_bits(asked, shorter));
         }
     }
@@ -351,7 +350,9 @@ TEST_P(Kernels, write_no_other_point) {
     const Deformer deformer(scene.data(), method());
     const Vec3<float> mark(-1e9f);
     std::vector<Vec3<float>> points(scene.rest_points.size() + 2, mark);
-    EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {}, std::span(points).subspan(1, scene.rest_points.size())), Status::ok);
+    EXPECT_EQ(
+        deformer.deform({scene.posed_from_rest}, {}, std::span(points).subspan(1, scene.rest_points.size())),
+        Status::ok);
     EXPECT_TRUE(same_bits(points.front(), mark));
     EXPECT_TRUE(same_bits(points.back(), mark));
     for (std::size_t i = 1; i + 1 < points.size(); ++i) ASSERT_FALSE(same_bits(points[i], mark));

@@ -89,7 +89,8 @@ TEST_P(Mixes, where_weights_are_0_or_1_have_the_bits_of_one_method) {
     for (const Affine<float>& space : {Affine<float>{}, another_space}) {
         const auto a = deformed(Deformer(binding, first()), scene, {}, space);
         const auto b = deformed(Deformer(binding, second()), scene, {}, space);
-        const auto points = deformed(Deformer(binding, first(), MixData{second(), weights}), scene, {}, space);
+        const auto points =
+            deformed(Deformer(binding, first(), MixData{second(), weights}), scene, {}, space);
         for (std::size_t v = 0; v < points.size(); ++v) {
             if (weights[v] == 0.0f) {
                 ASSERT_TRUE(same_bits(points[v], a[v])) << v;

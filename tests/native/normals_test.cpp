@@ -150,7 +150,8 @@ TEST(Normals, write_nothing_where_sizes_do_not_fit) {
     const Mesh mesh = random_mesh(8, 6);
     const Normals normals = normals_of(mesh);
     std::vector<Vec3<float>> result(mesh.rest_points.size(), Vec3<float>(7.0f));
-    EXPECT_EQ(normals.compute(NormalDomain::vertex, std::span(mesh.rest_points).first(3), result), Status::size);
+    EXPECT_EQ(normals.compute(NormalDomain::vertex, std::span(mesh.rest_points).first(3), result),
+              Status::size);
     EXPECT_EQ(normals.compute(NormalDomain::corner, mesh.rest_points, result), Status::size);
     for (const auto& normal : result) ASSERT_EQ(normal, Vec3<float>(7.0f));
 }

@@ -174,7 +174,8 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
         for (Deformer& deformer : deformers) {
             for (const std::size_t threads : {1, 4, 0}) {
                 EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {threads}, points), Status::ok);
-                EXPECT_EQ(deformer.deform({scene.posed_from_rest, bones_from_model}, {threads}, points), Status::ok);
+                EXPECT_EQ(deformer.deform({scene.posed_from_rest, bones_from_model}, {threads}, points),
+                          Status::ok);
             }
             EXPECT_EQ(deformer.set_rest_points(other_rest_points), Status::ok);
         }

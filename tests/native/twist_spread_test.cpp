@@ -149,7 +149,9 @@ TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
                 TwistSpreadOptions options{0.9f, amounts, curves, {}, first, second};
                 if (are_known) options.channels = channels;
                 auto points = before;
-                EXPECT_EQ(TwistSpread(Binding(scene.data()), data).apply(points, {scene.posed_from_rest}, options), Status::ok);
+                EXPECT_EQ(
+                    TwistSpread(Binding(scene.data()), data).apply(points, {scene.posed_from_rest}, options),
+                    Status::ok);
                 const auto expected = by_definition(scene, data, before, options);
                 EXPECT_LT(largest_error(points, expected), 40.0 * kTolerance);
                 EXPECT_GT(largest_error(before, expected), 0.1);

@@ -22,7 +22,7 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept {
 }
 
 float size_of(const Vec3<double>& translation, double length_squared) noexcept {
-    if (!(length_squared < kLong)) return std::numeric_limits<float>::infinity();
+    if (!(length_squared < kMaxStretchSquared)) return std::numeric_limits<float>::infinity();
     return std::max(static_cast<float>(glm::dot(translation, translation)), kMinSize * kMinSize);
 }
 
@@ -76,12 +76,13 @@ void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bon
         prepare_posed(bones, palette);
         kernel.set_rows(bones, palette);
         // Pairs are pairs of bones, but these rows belong to sets, so each set has to be tested.
-        std::fill_n(palette.may_be_plain, bones.sets->bones.size(), std::uint8_t{1});
+        std::fill_n(palette.may_need_absolute_sum, bones.sets->bones.size(), std::uint8_t{1});
         return;
     }
     // Nearly always all of them are posed.
     std::size_t posed = bones.used.size();
-    while (posed > 0 && static_cast<std::size_t>(bones.used[posed - 1]) >= bones.pose.posed_from_rest.size()) {
+    while (posed > 0 &&
+           static_cast<std::size_t>(bones.used[posed - 1]) >= bones.pose.posed_from_rest.size()) {
         --posed;
     }
     Bones of_pose = bones;
@@ -100,7 +101,7 @@ void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bon
         if (palette.any_scale) palette.has_scale[i] = 0;
         palette.sizes[i] = kMinSize * kMinSize;
     }
-    find_plain(pairs, bones.used.size(), palette);
+    find_absolute_sums(pairs, bones.used.size(), palette);
 }
 
 }  // namespace sinew

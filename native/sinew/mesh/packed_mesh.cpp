@@ -341,7 +341,7 @@ void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_point
 }
 
 Status set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
-                    std::vector<Lanes<float>>& packed) noexcept {
+                      std::vector<Lanes<float>>& packed) noexcept {
     try {
         packed.resize(kPointRows * mesh.blocks.size());
     } catch (const std::bad_alloc&) {

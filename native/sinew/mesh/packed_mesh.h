@@ -112,7 +112,7 @@ struct BoneSets {
 /// Packs other rest points [vertices] in the form of PackedMesh::rest_points, into memory that the first call
 /// allocates.
 Status set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
-                                  std::vector<Lanes<float>>& packed) noexcept;
+                      std::vector<Lanes<float>>& packed) noexcept;
 
 /// The form of PackedMesh::rest_points for rest points [vertices].
 void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,

@@ -120,7 +120,7 @@ std::size_t Normals::count(NormalDomain domain) const noexcept {
 }
 
 Status Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
-                      std::span<Vec3<float>> normals, std::size_t threads) const noexcept {
+                        std::span<Vec3<float>> normals, std::size_t threads) const noexcept {
     const State& state = *state_;
     if (points.size() != count(NormalDomain::vertex) || normals.size() != count(domain)) return Status::size;
     const NormalMesh& mesh = state.mesh;

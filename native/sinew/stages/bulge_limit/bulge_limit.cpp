@@ -93,7 +93,7 @@ BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
     : state_(make_owned<State>(binding, data)) {}
 
 Status BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
-                                 const Affine<float>& bones_from_model) noexcept {
+                                   const Affine<float>& bones_from_model) noexcept {
     const Status status = status_of_rest(rest_points, vertex_count(), bones_from_model);
     if (status != Status::ok) return status;
     const std::scoped_lock lock(state_->mutex);

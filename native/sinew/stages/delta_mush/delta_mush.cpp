@@ -194,7 +194,7 @@ public:
 private:
     [[nodiscard]] std::size_t begin(std::size_t part) const noexcept { return chunks_ * part / parts_; }
 
-    /// Runs what needs no chunk of another part, which is less with each iteration.
+    /// Runs the part's trapezoid: iteration i skips i * reach chunks at each inner border.
     template <class Run>
     void run_part(std::size_t part, std::size_t count, const Run& run) const {
         const std::size_t first = begin(part);
@@ -209,7 +209,7 @@ private:
         }
     }
 
-    /// Runs what is then missing between a part and the next.
+    /// Runs the chunks that run_part() skipped at the border between a part and the next.
     template <class Run>
     void run_between(std::size_t part, std::size_t count, const Run& run) const {
         const std::size_t middle = begin(part + 1);

@@ -256,7 +256,7 @@ struct TwistSpread::State {
     std::vector<BlockTwist> block_twists;
     std::vector<Lanes<float>> own_rest_points;  // empty: use those of the binding
     std::vector<Lanes<float>> weights;          // [PackedMesh::blocks], or empty
-    std::vector<Lanes<float>> mix;              // the same
+    std::vector<Lanes<float>> mix;              // [PackedMesh::blocks], or empty
     SpaceRows space_rows{Affine<float>{}};
     mutable std::vector<TwistedBone> bones;  // [twists] scratch for one call
     mutable ForkSafeMutex mutex;
@@ -266,7 +266,7 @@ TwistSpread::TwistSpread(const Binding& binding, const TwistSpreadData& data)
     : state_(make_owned<State>(binding, data)) {}
 
 Status TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
-                                  const Affine<float>& bones_from_model) noexcept {
+                                    const Affine<float>& bones_from_model) noexcept {
     Status status = status_of_rest(rest_points, vertex_count(), bones_from_model);
     if (status != Status::ok) return status;
     const std::scoped_lock lock(state_->mutex);
