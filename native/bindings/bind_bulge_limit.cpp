@@ -5,7 +5,6 @@
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "module.h"
 #include "parameters.h"
 #include "sinew/bulge_limit.h"
 #include "stages.h"

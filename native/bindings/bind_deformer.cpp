@@ -9,7 +9,6 @@
 #include "broadcast.h"
 #include "deform_arguments.h"
 #include "gil.h"
-#include "module.h"
 #include "parameters.h"
 #include "sinew/deformer.h"
 #include "sinew/mesh/check_arrays.h"

@@ -4,7 +4,6 @@
 #include "arrays.h"
 #include "deform_arguments.h"
 #include "gil.h"
-#include "module.h"
 #include "sinew/skinned_normals.h"
 
 namespace sinew::bindings {

@@ -5,7 +5,6 @@
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "module.h"
 #include "parameters.h"
 #include "sinew/twist_spread.h"
 #include "stages.h"

@@ -136,7 +136,7 @@ struct TwistSpreadStage {
         return rotate(quat_from_axis_angle(axis, T(2) * std::numbers::pi_v<T> * turns), arm) - arm;
     }
 
-    /// The whole turns that shortest-path blending drops where bones are `around` turns farther apart. There is nothing
+    /// The turns that shortest-path blending drops where bones are `around` whole turns farther apart. There is nothing
     /// between one way round and the other: the greater part decides.
     ///
     /// below  the weights of the bones beyond the twist, of all weights
