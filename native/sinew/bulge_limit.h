@@ -9,7 +9,7 @@
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
-#include "sinew/pose.h"
+#include "sinew/skeleton/pose.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 namespace sinew {

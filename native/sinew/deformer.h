@@ -9,7 +9,7 @@
 #include "sinew/base/owned.h"
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
-#include "sinew/pose.h"
+#include "sinew/skeleton/pose.h"
 
 namespace sinew {
 

@@ -10,7 +10,7 @@
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
-#include "sinew/pose.h"
+#include "sinew/skeleton/pose.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
 
 namespace sinew {

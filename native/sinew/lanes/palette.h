@@ -9,7 +9,7 @@
 #include <span>
 
 #include "sinew/mesh/packed_mesh.h"
-#include "sinew/pose.h"
+#include "sinew/skeleton/pose.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
