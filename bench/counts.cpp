@@ -47,10 +47,10 @@ void count_stages(Scene& scene, const std::string& kind) {
     }
     const std::vector<Affine<float>> rest_bones(scene.pose.size());
     const Deformer deformer(binding, Dq::info);
-    (void)deformer.deform(scene.pose, {{}, 1}, scene.points);
+    (void)deformer.deform({scene.pose}, {1}, scene.points);
     const BulgeLimit limit(binding, {segments});
     count("bulge_limit" + kind, [&] {
-        (void)limit.apply(scene.points, scene.pose, {BulgeForm::continuous, 1.0f, 1});
+        (void)limit.apply(scene.points, {scene.pose}, {BulgeForm::continuous, 1.0f, 1});
     });
     const TwistSpread spread(binding, {twists, rest_bones});
     TwistSpreadOptions options;
@@ -58,11 +58,11 @@ void count_stages(Scene& scene, const std::string& kind) {
     for (const TwistBlend blend : {TwistBlend::linear, TwistBlend::rotations}) {
         options.blend = options.mix_blend = blend;
         count((blend == TwistBlend::linear ? "twist_linear" : "twist_rotations") + kind,
-              [&] { (void)spread.apply(scene.points, scene.pose, options); });
+              [&] { (void)spread.apply(scene.points, {scene.pose}, options); });
     }
     std::vector<Vec3<float>> normals(scene.points.size(), Vec3<float>(0, 0, 1));
     const SkinnedNormals skinned(binding, Dq::info, {normals});
-    count("normals" + kind, [&] { (void)skinned.deform(scene.pose, {{}, 1}, scene.points, normals); });
+    count("normals" + kind, [&] { (void)skinned.deform({scene.pose}, {1}, scene.points, normals); });
 }
 
 void count_delta_mush() {
@@ -95,12 +95,11 @@ int main() {
         const std::string of = std::string("/") + kKindNames[static_cast<int>(kind)];
         for (const MethodInfo& method : kMethods) {
             const Deformer deformer(scene.data_for(method), method);
-            count(std::string(method.name) + of, [&] {
-                (void)deformer.deform(scene.pose, {{}, 1}, scene.points);
-            });
+            count(std::string(method.name) + of,
+                  [&] { (void)deformer.deform({scene.pose}, {1}, scene.points); });
             for (const Variant& variant : variants_of(method)) {
                 count(variant.name + of,
-                      [&] { (void)deformer.deform(scene.pose, variant.options(), scene.points); });
+                      [&] { (void)deformer.deform({scene.pose}, variant.options(), scene.points); });
             }
         }
         count("bind" + of, [&] { const Deformer deformer(scene.data(), Dq::info); });
@@ -110,9 +109,8 @@ int main() {
     Scene bones = make_scene({Kind::chain, 1000, 1000, 1});
     for (const MethodInfo& method : kMethods) {
         const Deformer deformer(bones.data_for(method), method);
-        count(std::string(method.name) + "/bones", [&] {
-            (void)deformer.deform(bones.pose, {{}, 1}, bones.points);
-        });
+        count(std::string(method.name) + "/bones",
+              [&] { (void)deformer.deform({bones.pose}, {1}, bones.points); });
     }
     return 0;
 }

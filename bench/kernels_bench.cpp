@@ -44,7 +44,7 @@ void ours(benchmark::State& state, const MethodInfo& method, const Shape& shape,
     Scene& scene = scene_of(shape);
     const Deformer& deformer = bound(shape).deformer(method);
     for (auto _ : state) {
-        (void)deformer.deform(scene.pose, options, scene.points);
+        (void)deformer.deform({scene.pose}, options, scene.points);
         benchmark::ClobberMemory();
     }
 }
@@ -58,10 +58,10 @@ void bulge_limit(benchmark::State& state, const Shape& shape) {
         segments.push_back({{0, 0, z}, {0, 0, z + 1}});
     }
     const BulgeLimit limit(Binding(scene.data()), {segments});
-    (void)bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
+    (void)bound(shape).deformer(Dq::info).deform({scene.pose}, {1}, scene.points);
     for (Vec3<float>& point : scene.points) point *= 1.01f;
     for (auto _ : state) {
-        (void)limit.apply(scene.points, scene.pose, {BulgeForm::continuous, 1e-12f, 1});
+        (void)limit.apply(scene.points, {scene.pose}, {BulgeForm::continuous, 1e-12f, 1});
         benchmark::ClobberMemory();
     }
 }
@@ -80,13 +80,13 @@ void twist_spread(benchmark::State& state, const Shape& shape, TwistBlend blend)
             {Mat3<float>(Vec3<float>(1, 0, 0), Vec3<float>(0, 0, 1), Vec3<float>(0, -1, 0)), {0, 0, z}});
     }
     const TwistSpread spread(Binding(scene.data()), {twists, rest_bones});
-    (void)bound(shape).deformer(Dq::info).deform(scene.pose, {{}, 1}, scene.points);
+    (void)bound(shape).deformer(Dq::info).deform({scene.pose}, {1}, scene.points);
     TwistSpreadOptions options;
     options.amount = 1e-3f;
     options.blend = blend;
     options.threads = 1;
     for (auto _ : state) {
-        (void)spread.apply(scene.points, scene.pose, options);
+        (void)spread.apply(scene.points, {scene.pose}, options);
         benchmark::ClobberMemory();
     }
 }
@@ -149,9 +149,8 @@ void register_all() {
             for_each_method([&]<class Method>(Method) {
                 const std::string of = "/" + std::string(Method::info.name) + scene;
                 for (const std::size_t threads : {1, 2}) {
-                    add("sinew" + std::to_string(threads) + of, [=](benchmark::State& s) {
-                        ours(s, Method::info, shape, {{}, threads});
-                    });
+                    add("sinew" + std::to_string(threads) + of,
+                        [=](benchmark::State& s) { ours(s, Method::info, shape, {threads}); });
                 }
                 for (const Variant& variant : variants_of(Method::info)) {
                     add("sinew1/" + variant.name + scene,
@@ -181,9 +180,7 @@ void register_all() {
     const auto add_cost = [](const std::string& influences, const Shape& shape) {
         for (const MethodInfo& method : kMethods) {
             add("cost/" + std::string(method.name) + "/" + influences + "/" + std::to_string(shape.bones),
-                [=](benchmark::State& s) {
-                    ours(s, method, shape, {{}, 1});
-                });
+                [=](benchmark::State& s) { ours(s, method, shape, {1}); });
         }
     };
     for (const std::size_t bones : {10, 30, 100, 300, 1000}) {

@@ -202,10 +202,10 @@ void add_kernels(const sinew::MethodInfo& method, std::string_view name) {
                                       transforms<Ours<sinew::Affine>>(), std::vector<glm::vec3>(count)});
     const auto run = [scene, times](benchmark::State& state) {
         const sinew::DeformOptions options{.threads = 1};
-        (void)scene->deformer.deform(scene->pose, options, scene->points);
+        (void)scene->deformer.deform({scene->pose}, options, scene->points);
         for (auto _ : state) {
             for (std::size_t i = 0; i < times; ++i) {
-                (void)scene->deformer.deform(scene->pose, options, scene->points);
+                (void)scene->deformer.deform({scene->pose}, options, scene->points);
             }
         }
     };

@@ -156,11 +156,21 @@ py::array_t<float> checked_points(const py::handle& value, const char* argument,
     return points;
 }
 
-void refuse_rest_points(const py::array_t<float>& points, std::size_t count,
-                        const Affine<float>& bones_from_model) {
+void raise_unless_ok(Status status) {
+    switch (status) {
+        case Status::ok: return;
+        case Status::memory: throw std::bad_alloc();
+        case Status::size: throw py::value_error("expected arrays of sizes that match, got others");
+        case Status::not_finite: throw py::value_error("expected finite values, got NaN or infinity");
+    }
+}
+
+void check_rest_points(Status status, const py::array_t<float>& points, std::size_t count,
+                       const Affine<float>& bones_from_model) {
+    if (status == Status::ok) return;
     check_points(as_points(points), count);
     check_space(bones_from_model);
-    throw std::bad_alloc();
+    raise_unless_ok(status);
 }
 
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument) {

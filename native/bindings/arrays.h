@@ -13,6 +13,7 @@
 #include <utility>
 #include <vector>
 
+#include "gil.h"
 #include "signatures.h"
 #include "sinew/transform/affine.h"
 
@@ -98,7 +99,7 @@ py::array_t<T> checked(const py::handle& value, const char* argument, py::ssize_
     return has_type<T>(array) ? in_order<T>(array) : as_type<T>(array, argument, wanted);
 }
 
-/// The same with two dimensions, the second of this length.
+/// checked() with two dimensions, the second of this length.
 template <class T>
 py::array_t<T> checked_rows(const py::handle& value, const char* argument, py::ssize_t columns,
                             const std::string& wanted, std::size_t most = kAnyLength) {
@@ -123,12 +124,13 @@ py::array_t<T> one_for_each(const py::object& values, const char* argument, std:
 /// An array [n, 3], n at most kMaxVertices.
 py::array_t<float> checked_points(const py::handle& value, const char* argument);
 
-/// The same, n = `count`.
+/// An array [n, 3], n = `count`.
 py::array_t<float> checked_points(const py::handle& value, const char* argument, std::size_t count);
 
-/// Raises for what set_rest_points() did not take: ValueError for points [n, 3] or their space, else MemoryError.
-[[noreturn]] void refuse_rest_points(const py::array_t<float>& points, std::size_t count,
-                                     const Affine<float>& bones_from_model = {});
+/// Raises what the status of a set_rest_points() says of its points [n, 3], of which there are to be `count`, and of
+/// their space.
+void check_rest_points(Status status, const py::array_t<float>& points, std::size_t count,
+                       const Affine<float>& bones_from_model = {});
 
 /// An array [n, 4, 4] or [n, 3, 4], row-major, finite. A fourth row is not read.
 std::vector<Affine<float>> checked_affines(const py::handle& value, const char* argument);

@@ -5,7 +5,6 @@
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "module.h"
 #include "parameters.h"
 #include "sinew/bulge_limit.h"
 #include "stages.h"
@@ -44,7 +43,7 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
     options.strength = static_cast<float>(checked_option(strength, "strength"));
     options.form = static_cast<BulgeForm>(static_cast<int>(checked_option(form, "form")));
     options.threads = checked_threads(threads);
-    return applied(limit, given, out, [&](auto to) { return limit.apply(to, bones, options); });
+    return applied(limit, given, out, [&](auto to) { return limit.apply(to, {bones}, options); });
 }
 
 }  // namespace

@@ -9,7 +9,6 @@
 #include "broadcast.h"
 #include "deform_arguments.h"
 #include "gil.h"
-#include "module.h"
 #include "parameters.h"
 #include "sinew/deformer.h"
 #include "sinew/mesh/check_arrays.h"
@@ -311,10 +310,11 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
         const auto of_bones = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
         arguments.rotations =
             continued_rotations(Skeleton(as_span(of_bones)), arguments.bones, checked_turns(turns));
-        options.rotations = arguments.rotations;
+        arguments.pose.rotations = arguments.rotations;
     }
-    options.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
-    check_space(options.bones_from_model);
+    arguments.pose.posed_from_rest = arguments.bones;
+    arguments.pose.bones_from_model = checked_affine(bones_from_model, "bones_from_model");
+    check_space(arguments.pose.bones_from_model);
     return arguments;
 }
 
@@ -328,16 +328,16 @@ py::array_t<float> deform(const Timed<Deformer>& deformer, const ArrayLike& bone
                                                      rest_inverses, parameters, parents, turns);
     py::array_t<float> points = checked_out(out, deformer.vertex_count());
     const auto to = as_points_to_write(points);
-    deformer.call([&] { return deformer.deform(arguments.bones, arguments.options, to); });
+    deformer.call([&] { return deformer.deform(arguments.pose, arguments.options, to); });
     return points;
 }
 
 void set_rest_points(Timed<Deformer>& deformer, const ArrayLike& rest_points) {
     const auto points = checked_points(rest_points, "rest_points");
     // May have to wait for another thread's deformation.
-    bool is_set = false;
-    without_gil([&] { is_set = deformer.set_rest_points(as_points(points)); });
-    if (!is_set) refuse_rest_points(points, deformer.vertex_count());
+    Status status{};
+    without_gil([&] { status = deformer.set_rest_points(as_points(points)); });
+    check_rest_points(status, points, deformer.vertex_count());
 }
 
 }  // namespace

@@ -4,7 +4,6 @@
 #include <string>
 
 #include "arrays.h"
-#include "module.h"
 #include "sinew/delta_mush.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 #include "stages.h"

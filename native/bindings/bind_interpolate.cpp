@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interpolations.h"
-#include "module.h"
 #include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/spline.h"
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <string>
 
-#include "module.h"
 #include "signatures.h"
 #include "sinew/methods/methods.h"
 #include "sinew/stages/stages.h"

@@ -11,7 +11,6 @@
 
 #include "arrays.h"
 #include "gil.h"
-#include "module.h"
 #include "sinew/normals.h"
 
 namespace sinew::bindings {

@@ -7,7 +7,6 @@
 
 #include "deform_arguments.h"
 #include "gil.h"
-#include "module.h"
 #include "sinew/base/job.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
 #if SINEW_WITH_DDM

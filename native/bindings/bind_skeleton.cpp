@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interpolations.h"
-#include "module.h"
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skeleton/keyframes.h"
 

@@ -4,7 +4,6 @@
 #include "arrays.h"
 #include "deform_arguments.h"
 #include "gil.h"
-#include "module.h"
 #include "sinew/skinned_normals.h"
 
 namespace sinew::bindings {
@@ -48,7 +47,7 @@ Deformed deform(const Timed<SkinnedNormals>& skinned, const ArrayLike& bone_tran
     const auto to_points = as_points_to_write(points), to_normals = as_points_to_write(normals),
                to_tangents = as_points_to_write(tangents);
     skinned.call([&] {
-        return skinned.deform(arguments.bones, arguments.options, to_points, to_normals, to_tangents);
+        return skinned.deform(arguments.pose, arguments.options, to_points, to_normals, to_tangents);
     });
     if (!skinned.has_tangents()) return py::make_tuple(points, normals, py::none());
     return py::make_tuple(points, normals, tangents);
@@ -67,7 +66,7 @@ py::array_t<float> deform_normals(const Timed<SkinnedNormals>& skinned, const Ar
     check_apart(normals, points);
     const auto to = as_points_to_write(normals);
     skinned.call(
-        [&] { return skinned.deform_normals(arguments.bones, arguments.options, as_points(points), to); });
+        [&] { return skinned.deform_normals(arguments.pose, arguments.options, as_points(points), to); });
     return normals;
 }
 

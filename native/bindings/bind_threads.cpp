@@ -3,7 +3,6 @@
 #include <cstdint>
 
 #include "gil.h"
-#include "module.h"
 #include "signatures.h"
 #include "sinew/base/fork_safe.h"
 

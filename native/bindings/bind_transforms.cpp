@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "broadcast.h"
-#include "module.h"
 #include "sinew/interpolate/spherical.h"
 #include "sinew/transform/rigid_distance.h"
 #include "sinew/transform/split_scale.h"

@@ -5,7 +5,6 @@
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "module.h"
 #include "parameters.h"
 #include "sinew/twist_spread.h"
 #include "stages.h"
@@ -88,7 +87,7 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
     options.blend = checked_blend(blend, "blend");
     options.mix_blend = checked_blend(mix_blend, "mix_blend");
     options.threads = checked_threads(threads);
-    return applied(spread, given, out, [&](auto to) { return spread.apply(to, bones, options); });
+    return applied(spread, given, out, [&](auto to) { return spread.apply(to, {bones}, options); });
 }
 
 }  // namespace

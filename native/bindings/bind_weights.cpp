@@ -3,7 +3,6 @@
 #include <string>
 
 #include "arrays.h"
-#include "module.h"
 #include "signatures.h"
 
 namespace sinew::bindings {

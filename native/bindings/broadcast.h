@@ -246,7 +246,7 @@ py::object map_items(const std::array<const char*, sizeof...(In)>& arguments,
         common, [&](py::ssize_t i) -> Result { return f(Item<In<T>>::read(inputs[I].at(i, common))...); });
 }
 
-/// The same with the element type that all arguments have after promoted(). The first argument must not be a
+/// map_items() with the element type that all arguments have after promoted(). The first argument must not be a
 /// scalar.
 template <template <class> class... In, class F>
 py::object map(const std::array<const char*, sizeof...(In)>& arguments,

@@ -2,9 +2,9 @@
 // Which other projects are compiled into the library and this module, with versions from their headers. It is
 // stored in the binary as text, so that the bill of materials (tools/sbom.py) is made from the binary itself, for
 // any platform.
-#include <glm/glm.hpp>
+#include <pybind11/pybind11.h>
 
-#include "module.h"
+#include <glm/glm.hpp>
 
 #ifdef SINEW_BINDINGS_WITH_EIGEN
 #include <Eigen/Core>

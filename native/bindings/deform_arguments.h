@@ -47,15 +47,16 @@ struct Parameters {
     std::vector<double> of_mix;
 };
 
-/// The options of a frame, and the data that they refer to.
+/// The pose and the options of a frame, and the data that they refer to.
 struct DeformArguments {
-    std::vector<Affine<float>> bones;  // posed_from_rest
+    std::vector<Affine<float>> bones;
     Parameters values;
     std::vector<Quat<float>> rotations;  // empty without parents
+    Pose pose;
     DeformOptions options;
 
     DeformArguments() = default;
-    DeformArguments(DeformArguments&&) = default;  // the options refer to memory that does not move
+    DeformArguments(DeformArguments&&) = default;  // pose and options refer to memory that does not move
     DeformArguments(const DeformArguments&) = delete;
 };
 

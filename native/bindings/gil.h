@@ -5,8 +5,9 @@
 
 #include <atomic>
 #include <chrono>
-#include <new>
 #include <utility>
+
+#include "sinew/base/status.h"
 
 namespace sinew::bindings {
 
@@ -27,6 +28,10 @@ void without_gil(const Work& work) {
     take_gil_back(state);
 }
 
+/// MemoryError without memory. Else ValueError: arguments are checked before a call, with better sentences, so this is
+/// for what the checks do not know.
+void raise_unless_ok(Status status);
+
 /// An object whose calls release the GIL only if they take long enough: with many threads waiting for it, acquiring
 /// it again takes longer than a short call. What a call takes depends on the method, the mesh, its settings and the
 /// machine, so the call before tells.
@@ -36,14 +41,14 @@ struct Timed : Object {
         : Object(std::move(object)) {}  // implicit, so that functions return either
     Timed(Timed&& other) noexcept : Object(std::move(other)) {}
 
-    /// Calls work(), which must neither throw nor touch Python's objects. It returns false where memory is missing:
-    /// arguments were checked before.
+    /// Calls work(), which returns a Status, and must neither throw nor touch Python's objects. Raises what the
+    /// status says.
     template <class Work>
     void call(const Work& work) const {
         constexpr std::chrono::nanoseconds kLongestUnderLock{30'000};
         const auto timed = [&] {
             const auto start = std::chrono::steady_clock::now();
-            if (!work()) throw std::bad_alloc();
+            raise_unless_ok(work());
             last_.store(std::chrono::steady_clock::now() - start, std::memory_order_relaxed);
         };
         last_.load(std::memory_order_relaxed) > kLongestUnderLock ? without_gil(timed) : timed();

@@ -1,9 +1,16 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "module.h"
-
 #include "broadcast.h"
 
 namespace sinew::bindings {
+
+// The only list of what is bound, each in bind_NAME.cpp: types before the functions that take or return them.
+#define SINEW_BINDINGS(bind)                                                                         \
+    bind(compiled_in) bind(methods) bind(skeleton) bind(transforms) bind(interpolate) bind(deformer) \
+        bind(twist_spread) bind(bulge_limit) bind(delta_mush) bind(normals) bind(skinned_normals)    \
+            bind(precompute) bind(threads) bind(weights)
+
+#define SINEW_DECLARE(name) void bind_##name(py::module_& m);
+SINEW_BINDINGS(SINEW_DECLARE)
 
 py::object named_tuple(const char* name, const py::tuple& parts) {
     return py::module_::import("sinew._types").attr(name)(*parts);
@@ -14,18 +21,6 @@ py::object named_tuple(const char* name, const py::tuple& parts) {
 PYBIND11_MODULE(_native, m) {
     m.doc() = "Sinew's C++ library. Use it through the package `sinew`.";
     m.attr("__version__") = SINEW_VERSION;
-    sinew::bindings::bind_compiled_in(m);
-    sinew::bindings::bind_methods(m);
-    sinew::bindings::bind_skeleton(m);
-    sinew::bindings::bind_transforms(m);
-    sinew::bindings::bind_interpolate(m);
-    sinew::bindings::bind_deformer(m);
-    sinew::bindings::bind_twist_spread(m);
-    sinew::bindings::bind_bulge_limit(m);
-    sinew::bindings::bind_delta_mush(m);
-    sinew::bindings::bind_normals(m);
-    sinew::bindings::bind_skinned_normals(m);
-    sinew::bindings::bind_precompute(m);
-    sinew::bindings::bind_threads(m);
-    sinew::bindings::bind_weights(m);
+#define SINEW_BIND(name) sinew::bindings::bind_##name(m);
+    SINEW_BINDINGS(SINEW_BIND)
 }

@@ -28,9 +28,9 @@ void set_rest_points(Timed<Stage>& stage, const ArrayLike& rest_points,
     const auto points = checked_points(rest_points, "rest_points");
     const Affine<float> space = checked_affine(bones_from_model, "bones_from_model");
     // May have to wait for another thread that applies it.
-    bool is_set = false;
-    without_gil([&] { is_set = stage.set_rest_points(as_points(points), space); });
-    if (!is_set) refuse_rest_points(points, stage.vertex_count(), space);
+    Status status{};
+    without_gil([&] { status = stage.set_rest_points(as_points(points), space); });
+    check_rest_points(status, points, stage.vertex_count(), space);
 }
 
 }  // namespace sinew::bindings

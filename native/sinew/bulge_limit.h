@@ -6,8 +6,10 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
+#include "sinew/skeleton/pose.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 namespace sinew {
@@ -33,10 +35,11 @@ public:
     BulgeLimit(const Binding& binding, const BulgeLimitData& data);
 
     /// Sets other rest points [vertices], or the same points with another bones_from_model. Takes about as long
-    /// as apply(). Returns whether the size fits, all are finite and the transform has an inverse: else nothing
-    /// changes.
-    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points,
-                                       const Affine<float>& bones_from_model = {}) noexcept;
+    /// as apply().
+    ///
+    /// bones_from_model  invertible
+    Status set_rest_points(std::span<const Vec3<float>> rest_points,
+                           const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// As Binding::bone_count().
@@ -44,12 +47,12 @@ public:
 
     /// Limits the points in place.
     ///
-    /// points           [vertices] deformed, model space
-    /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
+    /// points  [vertices] deformed, model space
+    /// pose    only its bones are read: the space is that of the rest points
     ///
     /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
-    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-                             const BulgeLimitOptions& options = {}) const noexcept;
+    Status apply(std::span<Vec3<float>> points, const Pose& pose,
+                 const BulgeLimitOptions& options = {}) const noexcept;
 
 private:
     struct State;

@@ -5,19 +5,15 @@
 #include <array>
 #include <vector>
 
-#include "sinew/lanes/palette_store.h"
-#include "sinew/methods/packed_binding.h"
+#include "sinew/deformer_state.h"
 #include "sinew/methods/signs.h"
-#include "sinew/stages/mix/mix_blocks.h"
 
 namespace sinew {
 namespace {
 
-/// The parameters of one method for one frame. One more than the maximum, which may be 0.
-using ParameterValues = std::array<double, kMaxMethodParameters + 1>;
-
-ParameterValues valid_values(const MethodInfo& method, std::span<const double> given) noexcept {
-    ParameterValues values{};
+/// The parameters of one method for one frame.
+PreparedPose::ParameterValues valid_values(const MethodInfo& method, std::span<const double> given) noexcept {
+    PreparedPose::ParameterValues values{};
     for (std::size_t i = 0; i < method.parameters.size(); ++i) {
         const Parameter& parameter = method.parameters[i];
         values[i] = i < given.size() ? valid_value(parameter, given[i]) : parameter.initial;
@@ -32,50 +28,27 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 
 }  // namespace
 
-struct Deformer::State {
-    State(std::shared_ptr<const PackedBinding> packed, std::vector<Lanes<float>> own_rest_points,
-          const MethodInfo& method, const std::optional<MixData>& mix);
+Owned<Deformer::State> Deformer::State::alone(const BindData& data, const MethodInfo& method,
+                                              const std::optional<MixData>& mix_data) {
+    const auto packed = std::make_shared<PackedBinding>(data);
+    std::vector<Lanes<float>> rest_points = std::move(packed->mesh.rest_points);
+    return make_owned<State>(packed, std::move(rest_points), method, mix_data);
+}
 
-    /// With its own binding, whose rest points it moves out of `packed`, since nothing else reads them.
-    static Owned<State> alone(const BindData& data, const MethodInfo& method,
-                              const std::optional<MixData>& mix) {
-        const auto packed = std::make_shared<PackedBinding>(data);
-        std::vector<Lanes<float>> rest_points = std::move(packed->mesh.rest_points);
-        return make_owned<State>(packed, std::move(rest_points), method, mix);
-    }
-
-    [[nodiscard]] std::span<const Kernel* const> kernels_in_use() const {
-        return std::span(kernels).first(mix ? 2 : 1);
-    }
-
-    [[nodiscard]] std::span<const Lanes<float>> rest_points() const {
-        return own_rest_points.empty() ? std::span(packed->mesh.rest_points) : std::span(own_rest_points);
-    }
-
-    std::shared_ptr<const PackedBinding> packed;
-    std::vector<Lanes<float>> own_rest_points;  // empty: use those of the binding
-    std::array<std::size_t, 2> methods;         // indices into Methods; the second is that of the mix
-    std::array<const Kernel*, 2> kernels;
-    std::optional<MixWeights> mix;
-    BoneSets sets;  // empty unless a kernel needs sets
-    PaletteStore palettes;
-
-private:
-    [[nodiscard]] BoneSets wanted_sets() const {
-        const auto wants = [](const Kernel* kernel) { return kernel->set_rows != nullptr; };
-        return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
-    }
-};
+BoneSets Deformer::State::wanted_sets() const {
+    const auto wants = [](const Kernel* kernel) { return kernel->set_rows != nullptr; };
+    return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
+}
 
 Deformer::State::State(std::shared_ptr<const PackedBinding> from, std::vector<Lanes<float>> rest_points,
-                       const MethodInfo& method, const std::optional<MixData>& with)
+                       const MethodInfo& method, const std::optional<MixData>& mix_data)
     : packed(std::move(from)),
       own_rest_points(std::move(rest_points)),
       methods{checked_method("method", method, *packed),
-              with ? checked_method("mix", with->method, *packed) : 0},
+              mix_data ? checked_method("mix", mix_data->method, *packed) : 0},
       kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
-      mix(with ? std::optional(checked_mix(packed->mesh, with->weights, packed->vertex_count))
-               : std::nullopt),
+      mix(mix_data ? std::optional(checked_mix(packed->mesh, mix_data->weights, packed->vertex_count))
+                   : std::nullopt),
       sets(wanted_sets()),
       palettes(kernels_in_use(), packed->mesh.used_bones.size(), sets.bones.size()) {}
 
@@ -104,46 +77,63 @@ std::vector<float> Deformer::mix_weights() const {
     return unpack_values(state_->packed->mesh, state_->mix->weights, vertex_count());
 }
 
-bool Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) noexcept {
-    if (!are_points(rest_points, vertex_count())) return false;
+Status Deformer::set_rest_points(std::span<const Vec3<float>> rest_points) noexcept {
+    const Status status = status_of_points(rest_points, vertex_count());
+    if (status != Status::ok) return status;
     const PaletteStore::Writing writing(state_->palettes);
     return set_own_points(state_->packed->mesh, rest_points, state_->own_rest_points);
 }
 
-bool Deformer::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                      std::span<Vec3<float>> points) const noexcept {
-    const PackedBinding& packed = *state_->packed;
-    if (points.size() != packed.vertex_count) return false;
-    const PaletteStore::Reading reading(state_->palettes);
-    const Bones bones{packed.mesh.used_bones,   packed.stretched_bones, posed_from_rest,  packed.rest_bones,
-                      options.bones_from_model, &state_->sets,          options.rotations};
-    const SpaceRows rows(options.bones_from_model);
-    const std::array<ParameterValues, 2> parameters{
-        valid_values(kMethods[state_->methods[0]], options.parameters),
-        valid_values(kMethods[state_->methods[1]], options.mix_parameters)};
-    std::array<Frame, 2> frames;
-    for (std::size_t k = 0; k < state_->kernels_in_use().size(); ++k) {
-        const Kernel& kernel = *state_->kernels[k];
+PreparedPose Deformer::State::prepare(const Pose& pose, const DeformOptions& options,
+                                      const PaletteStore::Reading& reading) const noexcept {
+    PreparedPose prepared{SpaceRows(pose.bones_from_model),
+                          {valid_values(kMethods[methods[0]], options.parameters),
+                           valid_values(kMethods[methods[1]], options.mix_parameters)}};
+    const Bones bones{.used = packed->mesh.used_bones,
+                      .stretched = packed->stretched_bones,
+                      .rest_bones = packed->rest_bones,
+                      .sets = &sets,
+                      .pose = pose};
+    for (std::size_t k = 0; k < kernels_in_use().size(); ++k) {
         Palette& palette = reading.palette(k);
         // Methods whose kernel can keep signs have that parameter first.
-        fill_palette(kernel, packed.mesh.pairs, bones, Signs::are_kept(parameters[k]), palette);
-        frames[k] = {&packed.mesh,
-                     state_->rest_points().data(),
-                     packed.vertex_data[state_->methods[k]].get(),
-                     kernel.set_rows != nullptr ? state_->sets.entries.data() : packed.mesh.bones.data(),
-                     &palette,
-                     rows.spaces(),
-                     parameters[k].data(),
-                     points.data()};
+        fill_palette(*kernels[k], packed->mesh.pairs, bones, Signs::are_kept(prepared.parameters[k]),
+                     palette);
+        prepared.palettes[k] = &palette;
     }
-    parallel_for_blocks(packed.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
-        if (state_->mix) {
-            deform_mix(state_->kernels, frames, *state_->mix, begin, end);
+    return prepared;
+}
+
+void Deformer::State::deform(const PreparedPose& pose, std::span<const Lanes<float>> rest_points,
+                             std::size_t threads, Vec3<float>* points) const noexcept {
+    const PackedMesh& mesh = packed->mesh;
+    std::array<Frame, 2> frames;
+    for (std::size_t k = 0; k < kernels_in_use().size(); ++k) {
+        frames[k] = {.mesh = &mesh,
+                     .rest_points = rest_points.data(),
+                     .vertex_data = packed->vertex_data[methods[k]].get(),
+                     .bones = kernels[k]->set_rows != nullptr ? sets.entries.data() : mesh.bones.data(),
+                     .palette = pose.palettes[k],
+                     .spaces = pose.space_rows.spaces(),
+                     .parameters = pose.parameters[k].data(),
+                     .points = points};
+    }
+    parallel_for_blocks(mesh, packed->vertex_count, threads, [&](std::size_t begin, std::size_t end) {
+        if (mix) {
+            deform_mix(kernels, frames, *mix, begin, end);
         } else {
-            state_->kernels[0]->deform[target_in_use()](frames[0], begin, end);
+            kernels[0]->deform[target_in_use()](frames[0], begin, end);
         }
     });
-    return true;
+}
+
+Status Deformer::deform(const Pose& pose, const DeformOptions& options,
+                        std::span<Vec3<float>> points) const noexcept {
+    if (points.size() != vertex_count()) return Status::size;
+    const PaletteStore::Reading reading(state_->palettes);
+    const PreparedPose prepared = state_->prepare(pose, options, reading);
+    state_->deform(prepared, state_->rest_points(), options.threads, points.data());
+    return Status::ok;
 }
 
 }  // namespace sinew

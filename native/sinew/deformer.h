@@ -7,24 +7,20 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/binding.h"
+#include "sinew/skeleton/pose.h"
 
 namespace sinew {
 
 /// How to deform one frame.
 struct DeformOptions {
-    /// Maps model space to the space of `posed_from_rest` and the rest bones, in which the bones are blended; the
-    /// result is mapped back. Invertible.
-    Affine<float> bones_from_model{};
     std::size_t threads = 0;
     /// [at most MethodInfo::parameters] values of the method's parameters, made valid by valid_value(). Missing
     /// ones have their defaults.
     std::span<const double> parameters{};
-    /// The same for the method that the stage `mix` adds.
+    /// Those of the method that the stage `mix` adds.
     std::span<const double> mix_parameters{};
-    /// [bones] the quaternion of each bone whose sign is taken where `signs` is "hierarchy"; unit length. Empty, and
-    /// for missing bones: the one nearer to the identity. See continued_rotations().
-    std::span<const Quat<float>> rotations{};
 };
 
 /// The stage `mix`: a second method, and its share at each vertex. See stages/mix/mix.h.
@@ -61,21 +57,23 @@ public:
     [[nodiscard]] std::vector<float> mix_weights() const;
 
     /// Sets the rest points [vertices] of this deformer alone, such as when shape keys change. Each result of a
-    /// concurrent deform() has either the old points or the new ones. The first call allocates
-    /// memory for them. Returns whether the size fits, all are finite and there is memory: else nothing changes.
-    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points) noexcept;
+    /// concurrent deform() has either the old points or the new ones. The first call allocates memory for them.
+    Status set_rest_points(std::span<const Vec3<float>> rest_points) noexcept;
 
     /// Writes the deformed points, model space.
     ///
-    /// posed_from_rest  [bones, at least bone_count()] finite; missing bones stay at rest
-    /// points           [vertices]
+    /// pose    of at least bone_count() bones
+    /// points  [vertices]
     ///
     /// A vertex without influences, or with only weights of 0, stays at rest.
-    [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                              std::span<Vec3<float>> points) const noexcept;
+    Status deform(const Pose& pose, const DeformOptions& options,
+                  std::span<Vec3<float>> points) const noexcept;
+
+    /// For the library's own files.
+    struct State;
+    [[nodiscard]] const State& state() const noexcept { return *state_; }
 
 private:
-    struct State;
     Owned<State> state_;
 };
 

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/export.h"
 #include "sinew/mesh/mesh_topology.h"
 #include "sinew/transform/quat.h"
@@ -68,8 +69,7 @@ public:
     /// scale   how much of the details is added back; 1: all
     ///
     /// A vertex without faces is smoothed and has no details.
-    [[nodiscard]] bool apply(std::span<Vec3<float>> points, float scale = 1.0f,
-                             std::size_t threads = 0) const noexcept;
+    Status apply(std::span<Vec3<float>> points, float scale = 1.0f, std::size_t threads = 0) const noexcept;
 
 private:
     struct State;

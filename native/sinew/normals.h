@@ -6,6 +6,7 @@
 #include <span>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/export.h"
 #include "sinew/mesh/mesh_topology.h"
 #include "sinew/transform/quat.h"
@@ -70,8 +71,8 @@ public:
     /// normals  [count(domain)] must not overlap `points`
     ///
     /// The result does not depend on the instruction set.
-    [[nodiscard]] bool compute(NormalDomain domain, std::span<const Vec3<float>> points,
-                               std::span<Vec3<float>> normals, std::size_t threads = 0) const noexcept;
+    Status compute(NormalDomain domain, std::span<const Vec3<float>> points, std::span<Vec3<float>> normals,
+                   std::size_t threads = 0) const noexcept;
 
 private:
     struct State;

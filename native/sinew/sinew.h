@@ -4,13 +4,13 @@
 // What holds for all of it: A constructor throws std::invalid_argument that names the argument, what was expected and
 // what was given; sizes that do not match and values that are not finite are always refused. It keeps no reference to
 // its arguments. A constructed object is valid; one that was moved from can only be assigned to or destroyed. Functions
-// that run each frame throw nothing. They return false, or what their header calls not defined, and write nothing, if a
-// size is wrong; set_rest_points() also if a point is not finite. They do not allocate, except at the first of calls
-// whose header says so, which return false without memory. Concurrent calls on one object wait for each other, except
+// that run each frame throw nothing and return a Status, or what their header calls not defined. They do not allocate,
+// except at the first of calls whose header says so. Concurrent calls on one object wait for each other, except
 // those of a Deformer. `threads` is how many are used at most, 0: as many as useful; the result is the same bit for bit.
 #pragma once
 
 #include "sinew/base/simd.h"
+#include "sinew/base/status.h"
 #include "sinew/base/thread_pool.h"
 #include "sinew/bulge_limit.h"
 #include "sinew/deformer.h"

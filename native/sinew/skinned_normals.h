@@ -44,24 +44,21 @@ public:
 
     /// Writes the deformed points, bit for bit those of a Deformer, and normals and tangents of unit length.
     ///
-    /// posed_from_rest  [bones, at least deformer().bone_count()] finite; missing bones stay at rest
-    /// points           [vertices]
-    /// normals          [frames]
-    /// tangents         [frames], or empty; empty if there are none at rest
+    /// pose      of at least deformer().bone_count() bones
+    /// points    [vertices]
+    /// normals   [frames]
+    /// tangents  [frames], or empty; empty if there are none at rest
     ///
     /// A vertex without influences keeps its normals and tangents.
-    [[nodiscard]] bool deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                              std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
-                              std::span<Vec3<float>> tangents = {}) const noexcept;
+    Status deform(const Pose& pose, const DeformOptions& options, std::span<Vec3<float>> points,
+                  std::span<Vec3<float>> normals, std::span<Vec3<float>> tangents = {}) const noexcept;
 
-    /// Writes the same normals if the points for the same pose and options are known. This saves a quarter of the
-    /// time.
+    /// Writes the normals of deform() where its points are known. This saves a quarter of the time.
     ///
-    /// points   [vertices] as written by deform() or by the Deformer
+    /// points   [vertices] as deform() or the Deformer writes them for this pose and these options
     /// normals  [frames]
-    [[nodiscard]] bool deform_normals(std::span<const Affine<float>> posed_from_rest,
-                                      const DeformOptions& options, std::span<const Vec3<float>> points,
-                                      std::span<Vec3<float>> normals) const noexcept;
+    Status deform_normals(const Pose& pose, const DeformOptions& options, std::span<const Vec3<float>> points,
+                          std::span<Vec3<float>> normals) const noexcept;
 
 private:
     struct State;

@@ -7,8 +7,10 @@
 #include <vector>
 
 #include "sinew/base/owned.h"
+#include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
+#include "sinew/skeleton/pose.h"
 #include "sinew/stages/twist_spread/twist_spread.h"
 
 namespace sinew {
@@ -26,9 +28,10 @@ struct TwistSpreadData {
 
 /// How to spread the twists of one frame.
 struct TwistSpreadOptions {
-    float amount = 1.0f;               // clamped to 0 to 1; NaN: 1
-    std::span<const float> amounts{};  // [twists] the same for each bone
-    std::span<const float> curves{};   // [twists] clamped to -1 to 1; NaN: 0
+    float amount = 1.0f;  // clamped to 0 to 1; NaN: 1
+    std::span<const float>
+        amounts{};  // [twists] further factors, one for each bone, clamped to 0 to 1; NaN: 1
+    std::span<const float> curves{};  // [twists] clamped to -1 to 1; NaN: 0
     // [twists] the channels of each tip; empty: unknown
     std::span<const TwistChannels<float>> channels{};
     TwistBlend blend = TwistBlend::linear;      // of the method that made the points
@@ -45,10 +48,11 @@ public:
     TwistSpread(const Binding& binding, const TwistSpreadData& data);
 
     /// Sets other rest points [vertices], or the same points with another bones_from_model. The first call
-    /// allocates memory for them. Returns whether the size fits, all are finite, the transform has an inverse and there
-    /// is memory: else nothing changes.
-    [[nodiscard]] bool set_rest_points(std::span<const Vec3<float>> rest_points,
-                                       const Affine<float>& bones_from_model = {}) noexcept;
+    /// allocates memory for them.
+    ///
+    /// bones_from_model  invertible
+    Status set_rest_points(std::span<const Vec3<float>> rest_points,
+                           const Affine<float>& bones_from_model = {}) noexcept;
 
     [[nodiscard]] std::size_t vertex_count() const noexcept;
     /// Of rest_bones. Poses have as many, or fewer.
@@ -61,12 +65,12 @@ public:
 
     /// Spreads the twists in place.
     ///
-    /// points           [vertices] deformed, model space
-    /// posed_from_rest  [bones] finite; missing bones stay at rest
+    /// points  [vertices] deformed, model space
+    /// pose    only its bones are read: the space is that of the rest points
     ///
     /// Where no bone is twisted, no bit changes.
-    [[nodiscard]] bool apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-                             const TwistSpreadOptions& options = {}) const noexcept;
+    Status apply(std::span<Vec3<float>> points, const Pose& pose,
+                 const TwistSpreadOptions& options = {}) const noexcept;
 
 private:
     struct State;

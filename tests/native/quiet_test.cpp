@@ -173,10 +173,11 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     const auto frames = [&](std::vector<Vec3<float>>& points) {
         for (Deformer& deformer : deformers) {
             for (const std::size_t threads : {1, 4, 0}) {
-                EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {{}, threads}, points));
-                EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {bones_from_model, threads}, points));
+                EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {threads}, points), Status::ok);
+                EXPECT_EQ(deformer.deform({scene.posed_from_rest, bones_from_model}, {threads}, points),
+                          Status::ok);
             }
-            EXPECT_TRUE(deformer.set_rest_points(other_rest_points));
+            EXPECT_EQ(deformer.set_rest_points(other_rest_points), Status::ok);
         }
     };
     std::vector<std::vector<Vec3<float>>> points(5, scene.rest_points);
@@ -207,8 +208,8 @@ TEST(Frames, allocate_nothing_and_lock_nothing) {
     EXPECT_LE(in_frames, 5 * 4 * 3 * static_cast<int>(deformers.size()));
 }
 
-// What throws nothing says by its result that memory is missing, and nothing has changed.
-TEST(Frames, without_memory_return_false) {
+// What throws nothing says by its status that memory is missing, and nothing has changed.
+TEST(Frames, without_memory_change_nothing) {
     const Scene scene = random_scene(7, 3000, 1.0);
     const Binding binding(scene.data());
     const std::vector<Affine<float>> rest_bones(scene.posed_from_rest.size());
@@ -223,15 +224,15 @@ TEST(Frames, without_memory_return_false) {
     has_memory = false;
     const auto without = results();
     has_memory = true;
-    EXPECT_EQ(without, (std::array{false, false}));
+    EXPECT_EQ(without, (std::array{Status::memory, Status::memory}));
     EXPECT_TRUE(same_bits(deformed(deformer, scene), before));
-    EXPECT_EQ(results(), (std::array{true, true}));
+    EXPECT_EQ(results(), (std::array{Status::ok, Status::ok}));
     EXPECT_FALSE(same_bits(deformed(deformer, scene), before));
 }
 
 template <auto function>
 constexpr bool is_nothrow_v = false;
-template <class T, class... Arguments, bool (T::*function)(Arguments...) noexcept>
+template <class T, class... Arguments, Status (T::*function)(Arguments...) noexcept>
 constexpr bool is_nothrow_v<function> = true;
 
 TEST(Stages, allocate_nothing_once_rest_points_were_set) {
@@ -245,9 +246,10 @@ TEST(Stages, allocate_nothing_once_rest_points_were_set) {
     TwistSpread spread(binding, {std::span(&twist, 1), rest_bones});
     auto points = scene.rest_points;
     const auto frame = [&] {
-        EXPECT_TRUE(limit.set_rest_points(scene.rest_points) && spread.set_rest_points(scene.rest_points));
-        EXPECT_TRUE(spread.apply(points, scene.posed_from_rest, {}));
-        EXPECT_TRUE(limit.apply(points, scene.posed_from_rest, {}));
+        EXPECT_EQ(limit.set_rest_points(scene.rest_points), Status::ok);
+        EXPECT_EQ(spread.set_rest_points(scene.rest_points), Status::ok);
+        EXPECT_EQ(spread.apply(points, {scene.posed_from_rest}, {}), Status::ok);
+        EXPECT_EQ(limit.apply(points, {scene.posed_from_rest}, {}), Status::ok);
     };
     frame();
     const int before = allocations;
@@ -256,10 +258,10 @@ TEST(Stages, allocate_nothing_once_rest_points_were_set) {
     static_assert(is_nothrow_v<&BulgeLimit::set_rest_points> && is_nothrow_v<&TwistSpread::set_rest_points> &&
                   is_nothrow_v<&Deformer::set_rest_points>);
     points.front().x = std::numeric_limits<float>::quiet_NaN();
-    EXPECT_FALSE(limit.set_rest_points(points));
-    EXPECT_FALSE(spread.set_rest_points(points));
-    EXPECT_FALSE(limit.set_rest_points(scene.rest_points, {Mat3<float>(0.0f), {}}));
-    EXPECT_FALSE(spread.set_rest_points(scene.rest_points, {Mat3<float>(0.0f), {}}));
+    EXPECT_EQ(limit.set_rest_points(points), Status::not_finite);
+    EXPECT_EQ(spread.set_rest_points(points), Status::not_finite);
+    EXPECT_EQ(limit.set_rest_points(scene.rest_points, {Mat3<float>(0.0f), {}}), Status::not_finite);
+    EXPECT_EQ(spread.set_rest_points(scene.rest_points, {Mat3<float>(0.0f), {}}), Status::not_finite);
 }
 
 #ifdef SINEW_COUNTS_ALL
@@ -272,8 +274,8 @@ TEST(Memory, comes_from_operator_new) {
         const Binding binding(scene.data());
         for (const MethodInfo& method : kMethods) {
             Deformer deformer(binding, method);
-            EXPECT_TRUE(deformer.set_rest_points(scene.rest_points));
-            EXPECT_TRUE(deformer.deform(scene.posed_from_rest, {{}, 4}, points));
+            EXPECT_EQ(deformer.set_rest_points(scene.rest_points), Status::ok);
+            EXPECT_EQ(deformer.deform({scene.posed_from_rest}, {4}, points), Status::ok);
         }
         const DeltaMush mush(mesh.topology(), mesh.rest_points, {});
         const Normals normals(mesh.topology(), mesh.rest_points.size(), {});
@@ -311,13 +313,13 @@ TEST(DeltaMush, and_normals_allocate_nothing_once_they_are_made) {
         DeformOptions options;
         options.threads = threads;
         int before = allocations;
-        EXPECT_TRUE(mush.apply(mesh.rest_points, 1.0f, threads));
-        EXPECT_TRUE(skinned.deform(scene.posed_from_rest, options, points, moved, tangents));
+        EXPECT_EQ(mush.apply(mesh.rest_points, 1.0f, threads), Status::ok);
+        EXPECT_EQ(skinned.deform({scene.posed_from_rest}, options, points, moved, tangents), Status::ok);
         EXPECT_EQ(allocations, before);
         for (const NormalDomain domain : {NormalDomain::vertex, NormalDomain::corner, NormalDomain::face}) {
             std::vector<Vec3<float>> result(normals.count(domain));
             before = allocations;
-            EXPECT_TRUE(normals.compute(domain, mesh.rest_points, result, threads));
+            EXPECT_EQ(normals.compute(domain, mesh.rest_points, result, threads), Status::ok);
             EXPECT_EQ(allocations, before);
             EXPECT_GT(result.back().z, 0.1f);
         }

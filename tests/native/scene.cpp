@@ -198,10 +198,12 @@ std::vector<Influence<T>> normalised_influences_of(const Scene& scene, std::size
 template std::vector<Influence<float>> normalised_influences_of<float>(const Scene&, std::size_t);
 template std::vector<Influence<double>> normalised_influences_of<double>(const Scene&, std::size_t);
 
-std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
-                                  const DeformOptions& options) {
+std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene, const DeformOptions& options,
+                                  const Affine<float>& bones_from_model,
+                                  std::span<const Quat<float>> rotations) {
     std::vector<Vec3<float>> points(deformer.vertex_count(), Vec3<float>(-1e9f));
-    EXPECT_TRUE(deformer.deform(scene.posed_from_rest, options, points));
+    EXPECT_EQ(deformer.deform({scene.posed_from_rest, bones_from_model, rotations}, options, points),
+              Status::ok);
     return points;
 }
 

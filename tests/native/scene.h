@@ -40,7 +40,7 @@ struct Scene {
     std::vector<float> weights;
     std::vector<Affine<float>> rest_bones;
     std::vector<Affine<float>> posed_from_rest;
-    // DeformOptions::rotations, whose signs definitions take; empty: theirs are free
+    // Pose::rotations, whose signs definitions take; empty: theirs are free
     std::vector<Quat<float>> rotations;
 
     // [vertices][kVertexNumbers] three points, then 1, or 0 for some vertices. A method uses the first of these
@@ -89,7 +89,9 @@ template <class T>
 std::vector<Influence<T>> normalised_influences_of(const Scene& scene, std::size_t vertex);
 
 std::vector<Vec3<float>> deformed(const Deformer& deformer, const Scene& scene,
-                                  const DeformOptions& options = {});
+                                  const DeformOptions& options = {},
+                                  const Affine<float>& bones_from_model = {},
+                                  std::span<const Quat<float>> rotations = {});
 
 /// The result of the method's definition in T, with weights normalised and bones prepared in double.
 template <class T>

@@ -287,12 +287,13 @@ def cpp_api() -> str:
 def public_headers() -> list[str]:
     """Those that are installed, but for the definitions of methods and stages."""
     described = (HEADERS / "CMakeLists.txt").read_text(encoding="utf-8")
-    listed = re.search(r"set\(headers\s+([^)]*)\)", described)
+    listed = re.search(r"list\(APPEND headers\s+([^)]*)\)", described)
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
+    top = sorted({path.name for path in HEADERS.glob("*.h")} - {"sinew.h", "deformer_state.h"})
     folders = ("transform", "interpolate", "skeleton")
     others = [path.relative_to(HEADERS).as_posix() for f in folders for path in (HEADERS / f).glob("*.h")]
-    return [name for name in listed[1].split() if name != "sinew.h"] + sorted(others)
+    return [*top, *listed[1].split(), *sorted(others)]
 
 
 def declarations(header: str) -> str:

@@ -57,10 +57,10 @@ void make_room() {
 
 /// Starts a thread. Returns false if the system refuses, or has no memory.
 template <class Run>
-bool start(std::thread& thread, bool gives_way, const Run& run) {
+bool start(std::thread& thread, bool low_priority, const Run& run) {
     try {
-        thread = std::thread([gives_way, run] {
-            if (gives_way) give_way();
+        thread = std::thread([low_priority, run] {
+            if (low_priority) give_way();
             works_since = now();
             run();
         });
@@ -72,14 +72,14 @@ bool start(std::thread& thread, bool gives_way, const Run& run) {
 
 }  // namespace
 
-Job::Job(std::size_t threads, bool gives_way) noexcept
-    : threads_(threads > 0 ? threads : hardware_threads()), gives_way_(gives_way) {}
+Job::Job(std::size_t threads, bool low_priority) noexcept
+    : threads_(threads > 0 ? threads : hardware_threads()), low_priority_(low_priority) {}
 
-bool Job::go_on(double done) noexcept {
+bool Job::report_progress(double done) noexcept {
     double before = progress();
     while (before < done && !done_.compare_exchange_weak(before, done, std::memory_order_relaxed)) {
     }
-    if (gives_way_) make_room();
+    if (low_priority_) make_room();
     return !is_cancelled_.load(std::memory_order_relaxed);
 }
 
@@ -100,7 +100,7 @@ void Job::for_each(std::size_t count, std::size_t chunk,
                 const std::size_t begin = next.fetch_add(chunk, std::memory_order_relaxed);
                 if (begin >= count) return;
                 work(begin, std::min(begin + chunk, count));
-                if (gives_way_) make_room();
+                if (low_priority_) make_room();
             }
         } catch (...) {
             next.store(count, std::memory_order_relaxed);
@@ -111,8 +111,8 @@ void Job::for_each(std::size_t count, std::size_t chunk,
     std::vector<std::thread> helpers(std::min(threads_, (count + chunk - 1) / chunk));
     // This thread is one of them.
     for (std::size_t i = 1; i < helpers.size(); ++i) {
-        const bool waits = gives_way_ && i >= (helpers.size() + 1) / 2;
-        if (!start(helpers[i], gives_way_, [&take_chunks, waits] { take_chunks(waits); })) break;
+        const bool waits = low_priority_ && i >= (helpers.size() + 1) / 2;
+        if (!start(helpers[i], low_priority_, [&take_chunks, waits] { take_chunks(waits); })) break;
     }
     take_chunks(false);
     for (std::thread& helper : helpers) {
@@ -130,8 +130,8 @@ struct BackgroundJob::State {
     std::atomic<bool> has_ended{false};
     std::thread thread;
 
-    State(std::size_t threads, bool gives_way, std::function<void(Job&)> its_work)
-        : job(threads, gives_way), work(std::move(its_work)) {}
+    State(std::size_t threads, bool low_priority, std::function<void(Job&)> its_work)
+        : job(threads, low_priority), work(std::move(its_work)) {}
 
     void run() noexcept {
         try {
@@ -145,10 +145,10 @@ struct BackgroundJob::State {
     }
 };
 
-BackgroundJob::BackgroundJob(std::size_t threads, bool gives_way, std::function<void(Job&)> work)
-    : state_(std::make_unique<State>(threads, gives_way, std::move(work))), forks_(forks()) {
+BackgroundJob::BackgroundJob(std::size_t threads, bool low_priority, std::function<void(Job&)> work)
+    : state_(std::make_unique<State>(threads, low_priority, std::move(work))), forks_(forks()) {
     const auto run = [state = state_.get()] { state->run(); };
-    if (!start(state_->thread, gives_way, run)) run();
+    if (!start(state_->thread, low_priority, run)) run();
 }
 
 BackgroundJob::~BackgroundJob() {

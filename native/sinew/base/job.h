@@ -17,9 +17,9 @@ namespace sinew {
 class SINEW_EXPORT Job {
 public:
     /// threads    at most so many share the work; 0: as many as useful
-    /// gives_way  whether threads that it starts have a lower priority, and work half of the time while frames are
+    /// low_priority  whether threads that it starts have a lower priority, and work half of the time while frames are
     ///            deformed; on a busy machine the work then takes much longer
-    explicit Job(std::size_t threads = 0, bool gives_way = false) noexcept;
+    explicit Job(std::size_t threads = 0, bool low_priority = false) noexcept;
 
     // For any thread.
 
@@ -30,17 +30,17 @@ public:
 
     // For the work, on any of its threads.
 
-    /// Reports the completed share, and rests where the job gives way. Returns false once the job was cancelled.
-    bool go_on(double done) noexcept;
+    /// Reports the completed share, and rests where the job has a low priority. Returns false once the job was cancelled.
+    bool report_progress(double done) noexcept;
     /// Calls work(begin, end) for chunks of at most `chunk` indices that cover [0, count), and returns when all are
-    /// done, or when the job was cancelled. Where it gives way, half of its threads wait while frames are deformed. The
+    /// done, or when the job was cancelled. With a low priority, half of its threads wait while frames are deformed. The
     /// first exception is rethrown; some chunks may then have been skipped.
     void for_each(std::size_t count, std::size_t chunk,
                   const std::function<void(std::size_t, std::size_t)>& work);
 
 private:
     std::size_t threads_;
-    bool gives_way_;
+    bool low_priority_;
     std::atomic<double> done_{0.0};
     std::atomic<bool> is_cancelled_{false};
 };
@@ -48,7 +48,7 @@ private:
 /// A job on a thread of its own, from the constructor on. A forked child finds it ended.
 class SINEW_EXPORT BackgroundJob {
 public:
-    BackgroundJob(std::size_t threads, bool gives_way, std::function<void(Job&)> work);
+    BackgroundJob(std::size_t threads, bool low_priority, std::function<void(Job&)> work);
     /// Cancels, and waits until the threads have ended.
     ~BackgroundJob();
     BackgroundJob(const BackgroundJob&) = delete;

@@ -49,7 +49,7 @@ template <class T>
            leave - arrive;
 }
 
-/// The same for rigid transforms, rigid throughout: a Bezier curve whose chords are screws (Shoemake 1985, for
+/// The cubic Hermite spline through rigid transforms, rigid throughout: a Bezier curve whose chords are screws (Shoemake 1985, for
 /// quaternions), with arbitrary velocities.
 ///
 /// keys        [n] unit

@@ -112,7 +112,7 @@ template <class Method, class T>
     return spline_blend<Method>(span, keys_of(span, keys));
 }
 
-/// The same in vector form. Not rigid between keys. Transform may be Vec3, for points, whose identity is 0.
+/// catmull_rom() in vector form. Not rigid between keys. Transform may be Vec3, for points, whose identity is 0.
 template <class Transform, class T>
 [[nodiscard]] Blended<Transform> catmull_rom_vector(std::span<const Transform> keys, std::span<const T> times,
                                                     T time) noexcept {

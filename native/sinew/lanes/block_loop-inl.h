@@ -50,7 +50,7 @@ inline void keep_blocks(const Frame& frame, std::size_t begin, std::size_t end) 
     }
 }
 
-/// The same for a frame. Vertices without bones keep their rest points.
+/// for_each_set() over the blocks of a frame. Vertices without bones keep their rest points.
 template <class OnSet, class OnOwn>
 HWY_INLINE void for_each_set(const Frame& frame, std::size_t begin, std::size_t end, const OnSet& on_set,
                              const OnOwn& on_own) {

@@ -132,7 +132,7 @@ void rigid_bone_rows(const Bones& of, Palette& palette) {
     constexpr std::size_t kMax = hn::MaxLanes(BoneTag());
     for (std::size_t i = 0; i < used.size(); i += kMax) {
         const auto bones = used.subspan(i, std::min(kMax, used.size() - i));
-        const Motions motions = load_motions(of.posed_from_rest, bones);
+        const Motions motions = load_motions(of.pose.posed_from_rest, bones);
         constexpr std::size_t kNumbers = Rows::kNumbers;
         BoneVec row[kNumbers];
         Rows::write_row(rotations(motions), motions.translation, row);

@@ -106,7 +106,7 @@ struct Kernel {
 
 /// Fills `palette`. Bones that the pose lacks stay at rest.
 ///
-/// keeps_signs  give rows the signs of bones.rotations, and keep them
+/// keeps_signs  give rows the signs of Pose::rotations, and keep them
 void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones, bool keeps_signs,
                   Palette& palette) noexcept;
 

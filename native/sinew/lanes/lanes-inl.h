@@ -375,9 +375,10 @@ HWY_INLINE std::size_t lanes_end(D d, const Block& block) {
     return hn::MaxLanes(D()) == kLanes ? hn::Lanes(d) : block.vertices;
 }
 
-/// Whether these influences of a vertex are added plainly, see Palette.
-HWY_INLINE bool is_added_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count) {
-    return HWY_UNLIKELY(palette.may_be_plain[bones[0]] != 0) && sinew::is_plain(palette, bones, count);
+/// Whether the sum of these influences of a vertex is absolute (Palette).
+HWY_INLINE bool is_summed_absolutely(const Palette& palette, const std::int32_t* bones, std::size_t count) {
+    return HWY_UNLIKELY(palette.may_need_absolute_sum[bones[0]] != 0) &&
+           sinew::needs_absolute_sum(palette, bones, count);
 }
 
 }  // namespace HWY_NAMESPACE

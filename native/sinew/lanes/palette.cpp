@@ -22,7 +22,7 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept {
 }
 
 float size_of(const Vec3<double>& translation, double length_squared) noexcept {
-    if (!(length_squared < kLong)) return std::numeric_limits<float>::infinity();
+    if (!(length_squared < kMaxStretchSquared)) return std::numeric_limits<float>::infinity();
     return std::max(static_cast<float>(glm::dot(translation, translation)), kMinSize * kMinSize);
 }
 
@@ -32,13 +32,13 @@ bool is_identity(const Affine<float>& a) noexcept {
 
 namespace {
 
-/// Whether `rotation`, of the bone with this number, has the other sign than bones.rotations.
+/// Whether `rotation`, of the bone with this number, has the other sign than bones.pose.rotations.
 bool is_away(const Bones& bones, std::size_t number, const Quat<double>& rotation) noexcept {
-    if (number >= bones.rotations.size()) return rotation.w < 0.0;
-    return glm::dot(Quat<double>(bones.rotations[number]), rotation) < 0.0;
+    if (number >= bones.pose.rotations.size()) return rotation.w < 0.0;
+    return glm::dot(Quat<double>(bones.pose.rotations[number]), rotation) < 0.0;
 }
 
-/// Gives rows the signs of bones.rotations.
+/// Gives rows the signs of bones.pose.rotations.
 void take_signs(const Kernel& kernel, const Bones& bones, const Palette& palette) noexcept {
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
         Float4* const row = palette.bones + kernel.rest_row.size() * i;
@@ -55,9 +55,9 @@ void prepare_posed(const Bones& bones, Palette& palette) noexcept {
     for (std::size_t bone = 0; bone < bones.used.size(); ++bone) {
         const auto number = static_cast<std::size_t>(bones.used[bone]);
         palette.posed[bone] = {};
-        if (number >= bones.posed_from_rest.size()) continue;
+        if (number >= bones.pose.posed_from_rest.size()) continue;
         palette.posed[bone] =
-            scaled_rigid(cast<double>(bones.posed_from_rest[number]), bones.rest_bone(bone));
+            scaled_rigid(cast<double>(bones.pose.posed_from_rest[number]), bones.rest_bone(bone));
         palette.any_scale = palette.any_scale || palette.posed[bone].has_scale;
         Quat<double>& rotation = palette.posed[bone].rigid.rotation;
         if (palette.keeps_signs && is_away(bones, number, rotation)) rotation = -rotation;
@@ -76,12 +76,13 @@ void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bon
         prepare_posed(bones, palette);
         kernel.set_rows(bones, palette);
         // Pairs are pairs of bones, but these rows belong to sets, so each set has to be tested.
-        std::fill_n(palette.may_be_plain, bones.sets->bones.size(), std::uint8_t{1});
+        std::fill_n(palette.may_need_absolute_sum, bones.sets->bones.size(), std::uint8_t{1});
         return;
     }
     // Nearly always all of them are posed.
     std::size_t posed = bones.used.size();
-    while (posed > 0 && static_cast<std::size_t>(bones.used[posed - 1]) >= bones.posed_from_rest.size()) {
+    while (posed > 0 &&
+           static_cast<std::size_t>(bones.used[posed - 1]) >= bones.pose.posed_from_rest.size()) {
         --posed;
     }
     Bones of_pose = bones;
@@ -100,7 +101,7 @@ void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bon
         if (palette.any_scale) palette.has_scale[i] = 0;
         palette.sizes[i] = kMinSize * kMinSize;
     }
-    find_plain(pairs, bones.used.size(), palette);
+    find_absolute_sums(pairs, bones.used.size(), palette);
 }
 
 }  // namespace sinew

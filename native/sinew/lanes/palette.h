@@ -9,6 +9,7 @@
 #include <span>
 
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/skeleton/pose.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
@@ -23,18 +24,18 @@ inline constexpr std::size_t kDisplacementRows = 3;
 
 /// A vertex's bones are summed in one of two ways, which differ only by rounding.
 ///
-/// Usually the first bone is taken whole, and the differences of the others from it are added by their weights,
-/// which takes fewer operations. The rounding error is then that of the first bone, whatever its weight. If the
-/// first bone is more than kAlike times as large as another, such as a bone that is far away, every bone is added
-/// by its weight instead: plainly. The choice depends only on the bones.
-inline constexpr float kAlike = 4.0f;
+/// Usually the sum is relative: the first bone is taken whole, and the differences of the others from it are added by
+/// their weights, which takes fewer operations. The rounding error is then that of the first bone, whatever its weight.
+/// If the first bone is more than kMaxSizeRatio times as large as another, such as a bone that is far away, the sum is
+/// absolute instead: every bone is added by its weight. The choice depends only on the bones.
+inline constexpr float kMaxSizeRatio = 4.0f;
 
 /// Bones smaller than this count as equally large: their rounding errors are far below any mesh's precision.
 inline constexpr float kMinSize = 1e-5f;
 
-/// A linear bone may lengthen vectors much if the squared difference of its columns from the identity's exceeds
-/// this; for a rotation it is at most 8.
-inline constexpr float kLong = 64.0f;
+/// A linear bone whose columns differ from the identity's by more than this, squared, may stretch vectors so much that
+/// its size counts as infinite; for a rotation the squared difference is at most 8.
+inline constexpr float kMaxStretchSquared = 64.0f;
 
 /// Sizes are written in groups of this many; there is room for one less after the last bone.
 inline constexpr std::size_t kSizesAtOnce = 8;
@@ -46,10 +47,10 @@ using PosedBone = ScaledRigid<QuatVec<double>, double>;
 /// memory.
 struct Palette {
     Float4* bones = nullptr;  // Kernel::rest_row.size() for each row
-    // squared lengths of the translations, at least kMinSize squared; infinite beyond kLong
+    // squared lengths of the translations, at least kMinSize squared; infinite beyond kMaxStretchSquared
     float* sizes = nullptr;
-    // Whether some vertex whose first bone is this one may be added plainly.
-    std::uint8_t* may_be_plain = nullptr;
+    // Whether a vertex whose first bone is this one may need an absolute sum.
+    std::uint8_t* may_need_absolute_sum = nullptr;
     Float4* scales = nullptr;           // kDisplacementRows for each bone, valid where it has scale
     std::uint8_t* has_scale = nullptr;  // not written if no bone has scale
     std::int32_t* scaled = nullptr;     // indices of bones that are to be prepared one by one
@@ -64,11 +65,9 @@ struct Bones {
     std::span<const std::int32_t> used;  // their numbers in the pose
     // indices into `used` of those whose rest axes do not have unit length
     std::span<const std::int32_t> stretched;
-    std::span<const Affine<float>> posed_from_rest;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
-    Affine<float> bones_from_model;
-    const BoneSets* sets;                    // empty unless a kernel has rows for sets
-    std::span<const Quat<float>> rotations;  // DeformOptions::rotations
+    const BoneSets* sets;                       // empty unless a kernel has rows for sets
+    Pose pose;
 
     /// Orthonormal, for an index into `used`.
     [[nodiscard]] Affine<double> rest_bone(std::size_t bone) const noexcept {
@@ -91,18 +90,18 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
 /// identity.
 [[nodiscard]] float size_of(const Vec3<double>& translation, double length_squared = 0.0) noexcept;
 
-/// Whether these bones of a vertex are added plainly.
-[[nodiscard]] inline bool is_plain(const Palette& palette, const std::int32_t* bones,
-                                   std::size_t count) noexcept {
+/// Whether the sum of these bones of a vertex is absolute.
+[[nodiscard]] inline bool needs_absolute_sum(const Palette& palette, const std::int32_t* bones,
+                                             std::size_t count) noexcept {
     const float first = palette.sizes[bones[0]];
     float least = first;
     for (std::size_t k = 1; k < count; ++k) least = std::min(least, palette.sizes[bones[k]]);
-    return !(first < kAlike * kAlike * least);
+    return !(first < kMaxSizeRatio * kMaxSizeRatio * least);
 }
 
-/// Fills Palette::may_be_plain from the sizes, once per frame for each pair of bones, so that the test runs for
+/// Fills Palette::may_need_absolute_sum from the sizes, once per frame for each pair of bones, so that the test runs for
 /// few vertices.
-void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept;
+void find_absolute_sums(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept;
 
 [[nodiscard]] bool is_identity(const Affine<float>& a) noexcept;
 
@@ -113,7 +112,7 @@ struct Spaces {
     const float* model_from_bones = nullptr;
 };
 
-/// These rows.
+/// Owns the rows that Spaces points to.
 class SpaceRows {
 public:
     /// bones_from_model  invertible

@@ -45,7 +45,7 @@ struct PaletteStore::Palettes {
         palette.posed = reinterpret_cast<PosedBone*>(next());
         palette.sizes = reinterpret_cast<float*>(next());
         palette.scaled = reinterpret_cast<std::int32_t*>(next());
-        palette.may_be_plain = reinterpret_cast<std::uint8_t*>(next());
+        palette.may_need_absolute_sum = reinterpret_cast<std::uint8_t*>(next());
         palette.has_scale = reinterpret_cast<std::uint8_t*>(next());
     }
 

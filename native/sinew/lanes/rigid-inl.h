@@ -66,7 +66,7 @@ struct Blend {
     Vec<D> quaternion[4];
 };
 
-/// The base of rows that are added plainly.
+/// The base of rows whose sum is absolute.
 inline constexpr float kNoBase[kMaxRow] = {};
 
 /// The dot product of a quaternion [4] with those of the lanes. Products and sums are rounded one by one, in the order
@@ -203,10 +203,10 @@ float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_
 
 #endif
 
-/// Copies the first bone of a set to `rows`, and the differences of the others from it or, if plain, the others
+/// Copies the first bone of a set to `rows`, and the differences of the others from it or, if kAbsolute, the others
 /// themselves, each with the sign with which it is added. Returns false if a sign depends on the weights, or if a
 /// bone has scale and therefore depends on the vertex.
-template <class Rigid, bool kPlain>
+template <class Rigid, bool kAbsolute>
 HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count,
                               float* rows) {
     if (count > kMaxResolved) return false;
@@ -216,28 +216,28 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
         }
     }
     // Within 45 degrees of the first, all are within 90 degrees of each other.
-    const float least = copy_aligned<Rigid, !kPlain>(palette, bones, count, rows);
+    const float least = copy_aligned<Rigid, !kAbsolute>(palette, bones, count, rows);
     if (Rigid::kSignedFloat4s == 0 || least > kCosine45 || palette.keeps_signs) return true;
-    if (!kPlain) copy_aligned<Rigid, false>(palette, bones, count, rows);
+    if (!kAbsolute) copy_aligned<Rigid, false>(palette, bones, count, rows);
     if (!signs_agree(rows, Rigid::kNumbers, count)) return false;
-    if (!kPlain) subtract_first<Rigid::kNumbers>(rows, count);
+    if (!kAbsolute) subtract_first<Rigid::kNumbers>(rows, count);
     return true;
 }
 
 /// Blends numbers [begin, begin + kSize) of a set's rows for kVectors neighbouring vectors, with resolved signs. With
 /// a fixed kCount the loop is unrolled.
 ///
-/// first_weight  of the first influence, only read if plain
+/// first_weight  of the first influence, only read if kAbsolute
 /// weights       of the second influence and those after it
 /// sums          [kVectors][kSize]
-template <std::size_t kNumbers, std::size_t kCount, bool kPlain, std::size_t kSize, std::size_t kVectors,
+template <std::size_t kNumbers, std::size_t kCount, bool kAbsolute, std::size_t kSize, std::size_t kVectors,
           class D>
 HWY_INLINE void blend_numbers(D d, const float* rows, std::size_t begin, std::size_t count,
                               const float* first_weight, const float* weights, Vec<D>* sums) {
     const std::size_t step = hn::Lanes(d);
     for (std::size_t v = 0; v < kVectors; ++v) {
         for (std::size_t i = 0; i < kSize; ++i) sums[kSize * v + i] = hn::Set(d, rows[begin + i]);
-        if constexpr (kPlain) {
+        if constexpr (kAbsolute) {
             const Vec<D> weight = hn::Load(d, first_weight + v * step);
             for (std::size_t i = 0; i < kSize; ++i) {
                 sums[kSize * v + i] = hn::Mul(weight, sums[kSize * v + i]);
@@ -260,12 +260,12 @@ HWY_INLINE void blend_numbers(D d, const float* rows, std::size_t begin, std::si
     }
 }
 
-/// Blends the rows of a set of bones for one vector. Arguments as above.
-template <std::size_t kNumbers, std::size_t kCount, bool kPlain, class D>
+/// Blends the rows of a set of bones for one vector. Arguments are those of blend_numbers().
+template <std::size_t kNumbers, std::size_t kCount, bool kAbsolute, class D>
 HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
                                        const float* weights) {
     Sum<D, kNumbers> sum;
-    blend_numbers<kNumbers, kCount, kPlain, kRow, 1>(d, rows, 0, count, first_weight, weights, sum.value);
+    blend_numbers<kNumbers, kCount, kAbsolute, kRow, 1>(d, rows, 0, count, first_weight, weights, sum.value);
     for (std::size_t i = kRow; i < kNumbers; ++i) sum.value[i] = hn::Set(d, rows[i]);
     return sum;
 }
@@ -275,8 +275,8 @@ HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count
 inline constexpr std::size_t kVectorsAtOnce = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
 
 /// Blends CentreRows of a set of bones for kVectors neighbouring vectors, and writes their motions at the points
-/// `p`. Other arguments as above.
-template <std::size_t kVectors, std::size_t kCount, bool kPlain, class D>
+/// `p`. Other arguments are those of blend_numbers().
+template <std::size_t kVectors, std::size_t kCount, bool kAbsolute, class D>
 HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const float* first_weights,
                               const float* weights, const Points<D>* p, Motion<D>* motions) {
     constexpr std::size_t kNumbers = CentreRows::kNumbers;
@@ -284,14 +284,14 @@ HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const f
     if constexpr (kVectors == 1) {
         Sum<D, kNumbers> sum;
         for (std::size_t i = 0; i < kNumbers; i += kRow) {
-            blend_numbers<kNumbers, kCount, kPlain, kRow, 1>(d, rows, i, count, first_weights, weights,
-                                                             sum.value + i);
+            blend_numbers<kNumbers, kCount, kAbsolute, kRow, 1>(d, rows, i, count, first_weights, weights,
+                                                                sum.value + i);
         }
         motions[0] = motion_at(sum, p[0]);
     } else {
         const auto blend = [&](std::size_t begin, Vec<D>* sums) HWY_ATTR {
-            blend_numbers<kNumbers, kCount, kPlain, 4, kVectors>(d, rows, begin, count, first_weights,
-                                                                 weights, sums);
+            blend_numbers<kNumbers, kCount, kAbsolute, 4, kVectors>(d, rows, begin, count, first_weights,
+                                                                    weights, sums);
         };
         const auto blend_axis = [&](std::size_t begin, Vec<D> Points<D>::*axis) HWY_ATTR {
             Vec<D> sums[4 * kVectors];
@@ -311,19 +311,19 @@ HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const f
     }
 }
 
-/// The same for bones with scale, or whose signs depend on the weights.
+/// Blends bones with scale, or whose signs depend on the weights, vector by vector.
 template <class Rigid, class D>
 HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, const std::int32_t* bones,
-                                               std::size_t count, bool plain, const float* first_weight,
+                                               std::size_t count, bool is_absolute, const float* first_weight,
                                                const float* weights, const Points<D>& rest) {
     constexpr std::size_t kNumbers = Rigid::kNumbers;
     const Vec<D> first = hn::Load(d, first_weight);
     const float* const row = row_of<kNumbers>(palette, bones[0]);
-    const float* const base = plain ? kNoBase : row;
+    const float* const base = is_absolute ? kNoBase : row;
     Blend<D, kNumbers> blend;
     for (std::size_t i = 0; i < kNumbers; ++i) {
         const Vec<D> number = hn::Set(d, row[i]);
-        blend.sum.value[i] = plain ? hn::Mul(first, number) : number;
+        blend.sum.value[i] = is_absolute ? hn::Mul(first, number) : number;
         if (i < 4) blend.quaternion[i] = hn::Mul(first, number);
     }
     Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
@@ -358,11 +358,11 @@ HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces
 }
 
 /// Deforms lanes [lane, lane + kVectors * N) of a block with resolved signs.
-template <class Rigid, std::size_t kVectors, std::size_t kCount, bool kPlain>
+template <class Rigid, std::size_t kVectors, std::size_t kCount, bool kAbsolute>
 HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                                std::size_t b, std::size_t lane, const float* bone_rows, std::size_t count) {
     const Full d;
-    const float* const first_weights = kPlain ? first_weights_of(frame, b) + lane : nullptr;
+    const float* const first_weights = kAbsolute ? first_weights_of(frame, b) + lane : nullptr;
     const float* const weights = weights_of(pointers, b) + lane;
     if constexpr (CentreKernel<Rigid>) {
         Points<Full> rest[kVectors];
@@ -373,15 +373,15 @@ HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers,
             rest[v] = load_rest(d, pointers, spaces, b, lane + v * step);
             centres[v] = Rigid::centre(d, pointers, spaces, b, lane + v * step, rest[v]);
         }
-        blend_motions<kVectors, kCount, kPlain>(d, bone_rows, count, first_weights, weights, centres,
-                                                motions);
+        blend_motions<kVectors, kCount, kAbsolute>(d, bone_rows, count, first_weights, weights, centres,
+                                                   motions);
         for (std::size_t v = 0; v < kVectors; ++v) {
             store_in_model(d, pointers, spaces, b, lane + v * step,
                            Rigid::finish(d, motions[v], centres[v], rest[v]));
         }
     } else {
         const auto sum =
-            blend_rows<Rigid::kNumbers, kCount, kPlain>(d, bone_rows, count, first_weights, weights);
+            blend_rows<Rigid::kNumbers, kCount, kAbsolute>(d, bone_rows, count, first_weights, weights);
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
     }
 }
@@ -389,7 +389,7 @@ HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers,
 /// Deforms blocks [begin, end) with the same bones, whose signs are resolved.
 ///
 /// kCount  their influences, or 0 for any number
-template <class Rigid, std::size_t kCount, bool kPlain = false>
+template <class Rigid, std::size_t kCount, bool kAbsolute = false>
 void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
     const Full d;
     constexpr std::size_t kVectors = CentreKernel<Rigid> ? kVectorsAtOnce : 1;
@@ -400,18 +400,18 @@ void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, con
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
             if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
-                deform_vectors<Rigid, 1, kCount, kPlain>(frame, pointers, spaces, b, lane, bone_rows,
-                                                         influences);
+                deform_vectors<Rigid, 1, kCount, kAbsolute>(frame, pointers, spaces, b, lane, bone_rows,
+                                                            influences);
             } else {
-                deform_vectors<Rigid, kVectors, kCount, kPlain>(frame, pointers, spaces, b, lane, bone_rows,
-                                                                influences);
+                deform_vectors<Rigid, kVectors, kCount, kAbsolute>(frame, pointers, spaces, b, lane,
+                                                                   bone_rows, influences);
             }
         }
     }
 }
 
 template <class Rigid>
-void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, bool plain) {
+void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, bool is_absolute) {
     const Full d;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
@@ -423,16 +423,16 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
         for (std::size_t lane = 0; lane < lanes; lane += hn::Lanes(d)) {
             const Points<Full> rest = load_rest(d, pointers, spaces, b, lane);
             const auto sum =
-                blend_bones<Rigid>(d, *frame.palette, bones, influences, plain,
+                blend_bones<Rigid>(d, *frame.palette, bones, influences, is_absolute,
                                    first_weights_of(frame, b) + lane, weights_of_block + lane, rest);
             finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
         }
     }
 }
 
-/// Deforms blocks [begin, end) with the same bones, which are added plainly.
+/// Deforms blocks [begin, end) with the same bones, whose sum is absolute.
 template <class Rigid>
-HWY_NOINLINE void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
+HWY_NOINLINE void deform_absolute_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = frame.bones + block.first_bone;
@@ -449,8 +449,8 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = frame.bones + block.first_bone;
-    if (is_added_plainly(*frame.palette, bones, block.influences))
-        return deform_plain_set<Rigid>(frame, begin, end);
+    if (is_summed_absolutely(*frame.palette, bones, block.influences))
+        return deform_absolute_set<Rigid>(frame, begin, end);
     if (!resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows)) {
         return deform_unresolved<Rigid>(frame, begin, end, false);
     }
@@ -475,10 +475,10 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const Points<One> rest = load_rest(d, pointers, spaces, b, lane);
         const std::int32_t* const of_vertex = bones + block.influences * lane;
-        const bool plain = is_added_plainly(*frame.palette, of_vertex, block.influences);
+        const bool is_absolute = is_summed_absolutely(*frame.palette, of_vertex, block.influences);
         const float* const weights = weights_of_block + lane;
-        const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, plain, weights,
-                                            weights + kLanes, rest);
+        const auto sum = blend_bones<Rigid>(d, *frame.palette, of_vertex, block.influences, is_absolute,
+                                            weights, weights + kLanes, rest);
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
     }
 }
@@ -489,7 +489,7 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 ///
 /// weights  of each influence, kLanes apart
 /// sums     receives the sum's Float4s, 4 * kLanes apart
-template <class Rigid, bool kPlain, bool kKeepsSigns>
+template <class Rigid, bool kAbsolute, bool kKeepsSigns>
 HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              const float* weights, float* sums) {
     const Four d;
@@ -501,7 +501,7 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
     V4 sum[kRowFloat4s<Rigid>];
     for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, first[q].value.data());
     V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
-    if (kPlain) {
+    if (kAbsolute) {
         for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
     }
     for (std::size_t k = 1; k < count; ++k) {
@@ -516,7 +516,7 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
         for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
             V4 by = hn::Load(d, row[q].value.data());
             if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
-            if (!kPlain) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
+            if (!kAbsolute) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
             sum[q] = hn::MulAdd(weight, by, sum[q]);
         }
         quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
@@ -526,8 +526,8 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
 
 /// Not inlined, so that its registers do not burden the usual case.
 template <class Rigid, bool kKeepsSigns>
-HWY_NOINLINE void blend_vertex_plainly(const Palette& palette, const std::int32_t* bones, std::size_t count,
-                                       const float* weights, float* sums) {
+HWY_NOINLINE void blend_vertex_absolutely(const Palette& palette, const std::int32_t* bones,
+                                          std::size_t count, const float* weights, float* sums) {
     blend_vertex<Rigid, true, kKeepsSigns>(palette, bones, count, weights, sums);
 }
 
@@ -544,8 +544,8 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
         const float* const weights = weights_of_block + lane;
         float* const to = sums[0] + 4 * lane;
-        if (is_added_plainly(palette, bones, block.influences)) {
-            blend_vertex_plainly<Rigid, kKeepsSigns>(palette, bones, block.influences, weights, to);
+        if (is_summed_absolutely(palette, bones, block.influences)) {
+            blend_vertex_absolutely<Rigid, kKeepsSigns>(palette, bones, block.influences, weights, to);
         } else {
             blend_vertex<Rigid, false, kKeepsSigns>(palette, bones, block.influences, weights, to);
         }

@@ -17,7 +17,7 @@ void scaled_bone_rows(const Bones& bones, Palette& palette) {
         const auto bone = static_cast<std::size_t>(index);
         const auto number = static_cast<std::size_t>(bones.used[bone]);
         const auto motion =
-            Method::prepare(cast<double>(bones.posed_from_rest[number]), bones.rest_bone(bone));
+            Method::prepare(cast<double>(bones.pose.posed_from_rest[number]), bones.rest_bone(bone));
         write(motion, palette.bones + kRow * bone, palette.scales + kDisplacementRows * bone);
         palette.sizes[bone] = size_of(to_quat_vec(motion.rigid).translation);
         if (!motion.has_scale) continue;

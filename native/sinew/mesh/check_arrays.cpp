@@ -28,9 +28,11 @@ void check_points(std::span<const Vec3<float>> points, std::size_t count) {
     check_finite("rest_points", points, "vertex");
 }
 
-bool are_points(std::span<const Vec3<float>> points, std::size_t count) noexcept {
-    return points.size() == count &&
-           std::ranges::all_of(points, [](const Vec3<float>& point) { return is_finite(point); });
+Status status_of_points(std::span<const Vec3<float>> points, std::size_t count) noexcept {
+    if (points.size() != count) return Status::size;
+    const bool are_finite =
+        std::ranges::all_of(points, [](const Vec3<float>& point) { return is_finite(point); });
+    return are_finite ? Status::ok : Status::not_finite;
 }
 
 void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count) {
@@ -66,6 +68,12 @@ void check_space(const Affine<float>& bones_from_model) {
 
 bool is_space(const Affine<float>& bones_from_model) noexcept {
     return is_finite(bones_from_model) && glm::determinant(Mat3<double>(bones_from_model.linear)) != 0.0;
+}
+
+Status status_of_rest(std::span<const Vec3<float>> points, std::size_t count,
+                      const Affine<float>& bones_from_model) noexcept {
+    const Status status = status_of_points(points, count);
+    return status == Status::ok && !is_space(bones_from_model) ? Status::not_finite : status;
 }
 
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count) {

@@ -7,6 +7,7 @@
 #include <string>
 
 #include "sinew/base/fail.h"
+#include "sinew/base/status.h"
 #include "sinew/export.h"
 #include "sinew/transform/affine.h"
 
@@ -24,8 +25,8 @@ void check_optional(const std::string& argument, std::size_t got, std::size_t co
 
 /// Throws if the rest points are not `count`, or if one is not finite.
 SINEW_EXPORT void check_points(std::span<const Vec3<float>> points, std::size_t count);
-/// Whether check_points() does not throw.
-[[nodiscard]] bool are_points(std::span<const Vec3<float>> points, std::size_t count) noexcept;
+/// What check_points() would throw for: Status::size or Status::not_finite.
+Status status_of_points(std::span<const Vec3<float>> points, std::size_t count) noexcept;
 
 /// Throws if the weights are not one for each vertex, or if one is NaN.
 void check_weights(const std::string& argument, std::span<const float> weights, std::size_t vertex_count);
@@ -39,6 +40,11 @@ void check_rest_bones(std::span<const Affine<float>> rest_bones, std::size_t bon
 SINEW_EXPORT void check_space(const Affine<float>& bones_from_model);
 /// Whether check_space() does not throw.
 [[nodiscard]] bool is_space(const Affine<float>& bones_from_model) noexcept;
+
+/// What keeps a stage from these rest points: that they are not `count`, or not finite, or that the transform has no
+/// inverse.
+Status status_of_rest(std::span<const Vec3<float>> points, std::size_t count,
+                      const Affine<float>& bones_from_model) noexcept;
 
 /// Throws if `triangles` [3 x any number] has a corner that is no vertex.
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);

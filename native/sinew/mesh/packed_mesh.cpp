@@ -340,15 +340,15 @@ void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_point
     }
 }
 
-bool set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
-                    std::vector<Lanes<float>>& packed) noexcept {
+Status set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                      std::vector<Lanes<float>>& packed) noexcept {
     try {
         packed.resize(kPointRows * mesh.blocks.size());
     } catch (const std::bad_alloc&) {
-        return false;
+        return Status::memory;
     }
     pack_points(mesh, rest_points, packed);
-    return true;
+    return Status::ok;
 }
 
 UnpackedMesh unpack(const PackedMesh& mesh, std::span<const Lanes<float>> rest_points, std::size_t vertices) {

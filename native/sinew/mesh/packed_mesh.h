@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "sinew/base/status.h"
 #include "sinew/base/thread_pool.h"
 #include "sinew/mesh/influence.h"
 #include "sinew/transform/affine.h"
@@ -109,9 +110,9 @@ struct BoneSets {
                               std::span<const std::int32_t> more_bones = {});
 
 /// Packs other rest points [vertices] in the form of PackedMesh::rest_points, into memory that the first call
-/// allocates. Returns false without memory: nothing is changed then.
-[[nodiscard]] bool set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
-                                  std::vector<Lanes<float>>& packed) noexcept;
+/// allocates.
+Status set_own_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,
+                      std::vector<Lanes<float>>& packed) noexcept;
 
 /// The form of PackedMesh::rest_points for rest points [vertices].
 void pack_points(const PackedMesh& mesh, std::span<const Vec3<float>> rest_points,

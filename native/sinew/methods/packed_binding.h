@@ -55,7 +55,8 @@ struct PackedBinding {
 /// The index in Methods of a method. Throws if it is none of them.
 [[nodiscard]] std::size_t checked_method(const std::string& argument, const MethodInfo& method);
 
-/// The same for a method that is to deform a binding, which must have its vertex data.
+/// The index in Methods of a method that is to deform a binding. Throws if it is none of them, or if the binding
+/// lacks its vertex data.
 [[nodiscard]] std::size_t checked_method(const std::string& argument, const MethodInfo& method,
                                          const PackedBinding& binding);
 

@@ -22,7 +22,7 @@ struct Signs {
          .kind = ParameterKind::choice,
          .choices = kChoices}};
 
-    /// Whether quaternions are summed with the signs that they have: those of DeformOptions::rotations. Else each
+    /// Whether quaternions are summed with the signs that they have: those of Pose::rotations. Else each
     /// has the sign that brings it nearer to the sum of those before it.
     [[nodiscard]] static constexpr bool are_kept(std::span<const double> parameters) noexcept {
         return !parameters.empty() && parameters[0] == 1.0;

@@ -123,11 +123,11 @@ struct NormalKernel {
 
     /// The normals of the faces of blocks [begin, end).
     OfRange faces;
-    /// The same, and the corners' angles and the custom normals of lone fans.
+    /// The normals of these faces, their corners' angles, and the custom normals of lone fans.
     OfRange corners;
     /// Sums groups [begin, end), to `normals`.
     OfRange sum;
-    /// The same, to `group_normals`; `begin` is a multiple of kLanes.
+    /// Sums groups [begin, end), to `group_normals`; `begin` is a multiple of kLanes.
     OfRange sum_groups;
     /// Custom normals for fan blocks [begin, end), to `block_normals`.
     OfRange customise;

@@ -119,10 +119,10 @@ std::size_t Normals::count(NormalDomain domain) const noexcept {
     return 0;
 }
 
-bool Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
-                      std::span<Vec3<float>> normals, std::size_t threads) const noexcept {
+Status Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
+                        std::span<Vec3<float>> normals, std::size_t threads) const noexcept {
     const State& state = *state_;
-    if (points.size() != count(NormalDomain::vertex) || normals.size() != count(domain)) return false;
+    if (points.size() != count(NormalDomain::vertex) || normals.size() != count(domain)) return Status::size;
     const NormalMesh& mesh = state.mesh;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
@@ -146,14 +146,14 @@ bool Normals::compute(NormalDomain domain, std::span<const Vec3<float>> points,
             threads, kGroupsOfChunk);
     }
     if (domain == NormalDomain::face) state.write(normals, mesh.face_sources.data(), all, threads);
-    if (domain != NormalDomain::corner) return true;
+    if (domain != NormalDomain::corner) return Status::ok;
     run(kNormalKernel.customise, frame, mesh.fan_blocks.size(), threads, kBlocksOfChunk);
     if (mesh.corner_sources.empty()) {
         state.write(normals, state.corner_vertices.data(), frame.group_normals, threads);
     } else {
         state.write(normals, mesh.corner_sources.data(), all, threads);
     }
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

@@ -5,12 +5,12 @@
 #include <array>
 #include <cmath>
 #include <mutex>
-#include <new>
 #include <string>
 #include <vector>
 
 #include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
+#include "sinew/deformer_state.h"
 #include "sinew/mesh/check_arrays.h"
 #include "sinew/normals/skinned_normal_kernel.h"
 
@@ -61,11 +61,11 @@ Vec3<float> unit(const Vec3<float>& v) {
 struct SkinnedNormals::State {
     State(const Binding& binding, const MethodInfo& method, const RestFrames& rest,
           const std::optional<MixData>& mix)
-        : deformers{Deformer(binding, method, mix), Deformer(binding, method, mix),
-                    Deformer(binding, method, mix), Deformer(binding, method, mix)},
+        : deformer(binding, method, mix),
           normals(rest.normals.begin(), rest.normals.end()),
           tangents(rest.tangents.begin(), rest.tangents.end()),
           vertices(rest.vertices.begin(), rest.vertices.end()) {
+        const PackedMesh& mesh = deformer.state().packed->mesh;
         const std::vector<Vec3<float>> points = binding.unpack().rest_points;
         const float step = step_of(points);
         inverse_step = 1.0f / step;
@@ -73,23 +73,25 @@ struct SkinnedNormals::State {
             std::vector<Vec3<float>> stepped = points;
             for (Vec3<float>& point : stepped) point[axis] += step;
             const auto i = static_cast<std::size_t>(axis);
-            if (!are_points(stepped, points.size())) {
+            if (status_of_points(stepped, points.size()) != Status::ok) {
                 fail("rest_points", "finite values", "infinity beside them");
             }
-            if (!deformers[1 + i].set_rest_points(stepped)) throw std::bad_alloc();
+            stepped_points[i].resize(mesh.rest_points.size());
+            pack_points(mesh, stepped, stepped_points[i]);
             moved[i].resize(points.size());
             if (!vertices.empty()) cofactors[i].resize(points.size());
         }
     }
 
-    /// Deforms the rest points displaced by a step along each axis.
-    [[nodiscard]] bool move_steps(std::span<const Affine<float>> posed_from_rest,
-                                  const DeformOptions& options) const noexcept {
-        bool are_moved = true;
+    /// Deforms the rest points, unless `points` is null, and those displaced by a step along each axis.
+    void move(const Pose& pose, const DeformOptions& options, Vec3<float>* points) const noexcept {
+        const Deformer::State& state = deformer.state();
+        const PaletteStore::Reading reading(state.palettes);
+        const PreparedPose prepared = state.prepare(pose, options, reading);
+        if (points != nullptr) state.deform(prepared, state.rest_points(), options.threads, points);
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            are_moved = deformers[1 + axis].deform(posed_from_rest, options, moved[axis]) && are_moved;
+            state.deform(prepared, stepped_points[axis], options.threads, moved[axis].data());
         }
-        return are_moved;
     }
 
     void move_normals(std::span<const Vec3<float>> points, std::span<Vec3<float>> to,
@@ -123,8 +125,9 @@ struct SkinnedNormals::State {
         }
     }
 
-    // for the rest points, then for these displaced by a step along each axis
-    std::array<Deformer, 4> deformers;
+    Deformer deformer;
+    // the rest points displaced by a step along each axis, as PackedMesh::rest_points
+    std::array<std::vector<Lanes<float>>, 3> stepped_points;
     float inverse_step = 1.0f;
     std::vector<Vec3<float>> normals;
     std::vector<Vec3<float>> tangents;
@@ -142,37 +145,35 @@ SkinnedNormals::SkinnedNormals(const Binding& binding, const MethodInfo& method,
 
 std::size_t SkinnedNormals::frame_count() const noexcept { return state_->normals.size(); }
 bool SkinnedNormals::has_tangents() const noexcept { return !state_->tangents.empty(); }
-const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformers[0]; }
+const Deformer& SkinnedNormals::deformer() const noexcept { return state_->deformer; }
 
-bool SkinnedNormals::deform(std::span<const Affine<float>> posed_from_rest, const DeformOptions& options,
-                            std::span<Vec3<float>> points, std::span<Vec3<float>> normals,
-                            std::span<Vec3<float>> tangents) const noexcept {
+Status SkinnedNormals::deform(const Pose& pose, const DeformOptions& options, std::span<Vec3<float>> points,
+                              std::span<Vec3<float>> normals,
+                              std::span<Vec3<float>> tangents) const noexcept {
     const State& state = *state_;
-    const std::size_t most_tangents = state.tangents.size();
-    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
-    if (!tangents.empty() && tangents.size() != most_tangents) return false;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return Status::size;
+    if (!tangents.empty() && tangents.size() != state.tangents.size()) return Status::size;
     const std::scoped_lock lock(state.mutex);
-    if (!state.deformers[0].deform(posed_from_rest, options, points)) return false;
-    if (!state.move_steps(posed_from_rest, options)) return false;
+    state.move(pose, options, points.data());
     state.move_normals(points, normals, options.threads);
-    if (tangents.empty()) return true;
+    if (tangents.empty()) return Status::ok;
     const auto part = [&](std::size_t begin, std::size_t end) {
         state.move_tangents(points, tangents, begin, end);
     };
     parallel_for(tangents.size(), useful_threads(options.threads, tangents.size(), kFramesWorthAThread),
                  part);
-    return true;
+    return Status::ok;
 }
 
-bool SkinnedNormals::deform_normals(std::span<const Affine<float>> posed_from_rest,
-                                    const DeformOptions& options, std::span<const Vec3<float>> points,
-                                    std::span<Vec3<float>> normals) const noexcept {
+Status SkinnedNormals::deform_normals(const Pose& pose, const DeformOptions& options,
+                                      std::span<const Vec3<float>> points,
+                                      std::span<Vec3<float>> normals) const noexcept {
     const State& state = *state_;
-    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return false;
+    if (points.size() != deformer().vertex_count() || normals.size() != frame_count()) return Status::size;
     const std::scoped_lock lock(state.mutex);
-    if (!state.move_steps(posed_from_rest, options)) return false;
+    state.move(pose, options, nullptr);
     state.move_normals(points, normals, options.threads);
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

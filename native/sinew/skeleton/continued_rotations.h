@@ -22,7 +22,7 @@ namespace sinew {
 ///                  went the longer way, so that a single bone turns beyond half a turn, too. 0: unknown. One that
 ///                  is over kTurnsAgree from the bone is not used, as something else turns the bone.
 ///
-/// A bone that mirrors has its parent's. One that is half a turn from its parent may have either sign.
+/// A mirrored bone takes its parent's rotation. One that is half a turn from its parent may have either sign.
 [[nodiscard]] SINEW_EXPORT std::vector<Quat<float>> continued_rotations(
     const Skeleton& skeleton, std::span<const Affine<float>> posed_from_rest,
     std::span<const Quat<float>> turns = {});

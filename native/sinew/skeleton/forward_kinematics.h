@@ -37,7 +37,7 @@ template <class Transform>
     return at == static_cast<std::int32_t>(top);
 }
 
-/// The same for only one bone and its descendants, after a change of that bone (Smith 2013, algorithm 1, called
+/// root_relative() of one bone and its descendants alone, after a change of that bone (Smith 2013, algorithm 1, called
 /// for a bone). The other elements of `root_from_bone` are not changed.
 ///
 /// Returns false, and writes nothing, if a size is wrong, or if there is no bone `top`.

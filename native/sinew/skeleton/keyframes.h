@@ -75,7 +75,7 @@ bool spline_keyframes(const Skeleton& skeleton,
         [](const auto& span, const auto& keys) { return spline_blend<Method>(span, keys); });
 }
 
-/// The same in vector form, as algorithm 3 is printed. Not rigid between keys.
+/// spline_keyframes() in vector form, as algorithm 3 is printed. Not rigid between keys.
 template <class Transform, class T>
 bool spline_keyframes_vector(const Skeleton& skeleton, std::span<const Transform> keyframes,
                              std::span<const T> times, T time,

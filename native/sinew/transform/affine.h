@@ -24,7 +24,7 @@ template <class T>
 
 #if defined(__has_builtin)
 #if __has_builtin(__builtin_shufflevector)
-/// The same product with vectors of four floats: the twelve numbers, column after column, fill three of them.
+/// The product in vectors of four floats: the twelve numbers, column after column, fill three of them.
 /// Equal to the generic product to the last bit, unless the compiler contracts products and sums
 /// (-ffp-contract=fast with FMA), which it may do differently here.
 [[nodiscard]] inline Affine<float> operator*(const Affine<float>& a, const Affine<float>& b) noexcept {

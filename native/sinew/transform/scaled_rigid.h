@@ -42,7 +42,7 @@ template <class T>
     return {rigid, split.scale, split.has_scale};
 }
 
-/// The same with the scale measured against the quaternion: the two together are the motion.
+/// scaled_rigid_of_blender() with the scale measured against the quaternion: the two together are the motion.
 template <class T>
 [[nodiscard]] ScaledRigid<QuatVec<T>, T> scaled_rigid(const Affine<T>& posed_from_rest,
                                                       const Affine<T>& rest_bone) noexcept {

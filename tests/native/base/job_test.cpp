@@ -27,7 +27,7 @@ constexpr std::chrono::seconds kPatience{60};
 
 /// Works until it is cancelled.
 void work_on(Job& job) {
-    while (job.go_on(0.5)) std::this_thread::yield();
+    while (job.report_progress(0.5)) std::this_thread::yield();
 }
 
 TEST(Job, covers_every_index_exactly_once) {
@@ -46,10 +46,10 @@ TEST(Job, covers_every_index_exactly_once) {
 
 TEST(Job, progress_never_falls) {
     Job job;
-    for (const double done : {0.2, 0.6, 0.4}) EXPECT_TRUE(job.go_on(done));
+    for (const double done : {0.2, 0.6, 0.4}) EXPECT_TRUE(job.report_progress(done));
     EXPECT_EQ(job.progress(), 0.6);
     job.cancel();
-    EXPECT_FALSE(job.go_on(0.7));
+    EXPECT_FALSE(job.report_progress(0.7));
 }
 
 TEST(Job, takes_no_chunk_once_it_was_cancelled) {
@@ -88,7 +88,7 @@ TEST(BackgroundJob, says_when_it_has_ended) {
     std::thread::id thread;
     const BackgroundJob background(2, true, [&](Job& job) {
         thread = std::this_thread::get_id();
-        job.go_on(0.25);
+        job.report_progress(0.25);
         while (!may_end) std::this_thread::yield();
     });
     EXPECT_FALSE(background.wait_for(std::chrono::milliseconds(1)));

@@ -15,7 +15,7 @@ extern "C" __attribute__((visibility("default"))) int work_on_threads(int thread
     std::vector<sinew::Affine<float>> pose(1);
     pose[0].translation = {1.0f, 1.0f, 1.0f};
     std::vector<sinew::Vec3<float>> points(count);
-    static_cast<void>(deformer.deform(pose, {{}, static_cast<std::size_t>(threads)}, points));
+    static_cast<void>(deformer.deform({pose}, {static_cast<std::size_t>(threads)}, points));
     return points.front() == sinew::Vec3<float>(2.0f, 3.0f, 4.0f) && points.back() == points.front() ? 1 : 0;
 }
 

@@ -79,13 +79,13 @@ Bound bound_scene(std::uint32_t seed, std::size_t bones, std::size_t of_vertex, 
     return bound;
 }
 
-double error_of(const Bound& bound, double variant, const DeformOptions& space = {}) {
+double error_of(const Bound& bound, double variant) {
     const Scene& scene = bound.scene;
     BindData data = scene.data();
     const VertexData rows = bound.data();
     data.vertex_data = std::span(&rows, 1);
     const double parameters[] = {variant};
-    DeformOptions options = space;
+    DeformOptions options;
     options.parameters = parameters;
     const auto points = deformed(Deformer(data, Ddm::info), scene, options);
     std::vector<Ddm::Bone<double>> bones;

@@ -51,7 +51,7 @@ Flags with_custom(Flags flags, const Mesh& mesh) {
 std::vector<Vec3<float>> computed(const Normals& normals, NormalDomain domain,
                                   std::span<const Vec3<float>> points, std::size_t threads = 0) {
     std::vector<Vec3<float>> result(normals.count(domain), Vec3<float>(7.0f));
-    EXPECT_TRUE(normals.compute(domain, points, result, threads));
+    EXPECT_EQ(normals.compute(domain, points, result, threads), Status::ok);
     return result;
 }
 
@@ -150,8 +150,9 @@ TEST(Normals, write_nothing_where_sizes_do_not_fit) {
     const Mesh mesh = random_mesh(8, 6);
     const Normals normals = normals_of(mesh);
     std::vector<Vec3<float>> result(mesh.rest_points.size(), Vec3<float>(7.0f));
-    EXPECT_FALSE(normals.compute(NormalDomain::vertex, std::span(mesh.rest_points).first(3), result));
-    EXPECT_FALSE(normals.compute(NormalDomain::corner, mesh.rest_points, result));
+    EXPECT_EQ(normals.compute(NormalDomain::vertex, std::span(mesh.rest_points).first(3), result),
+              Status::size);
+    EXPECT_EQ(normals.compute(NormalDomain::corner, mesh.rest_points, result), Status::size);
     for (const auto& normal : result) ASSERT_EQ(normal, Vec3<float>(7.0f));
 }
 

@@ -85,11 +85,12 @@ TEST_P(Mixes, where_weights_are_0_or_1_have_the_bits_of_one_method) {
     const auto weights = painted(4, scene.rest_points.size());
     ASSERT_GT(std::ranges::count(weights, 0.0f), 500);
     ASSERT_GT(std::ranges::count(weights, 1.0f), 500);
-    const DeformOptions in_another_space{{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}}, 0};
-    for (const DeformOptions& options : {DeformOptions{}, in_another_space}) {
-        const auto a = deformed(Deformer(binding, first()), scene, options);
-        const auto b = deformed(Deformer(binding, second()), scene, options);
-        const auto points = deformed(Deformer(binding, first(), MixData{second(), weights}), scene, options);
+    const Affine<float> another_space{to_mat3(about<float>({1, 2, 3}, 40.0f)), {1, -2, 3}};
+    for (const Affine<float>& space : {Affine<float>{}, another_space}) {
+        const auto a = deformed(Deformer(binding, first()), scene, {}, space);
+        const auto b = deformed(Deformer(binding, second()), scene, {}, space);
+        const auto points =
+            deformed(Deformer(binding, first(), MixData{second(), weights}), scene, {}, space);
         for (std::size_t v = 0; v < points.size(); ++v) {
             if (weights[v] == 0.0f) {
                 ASSERT_TRUE(same_bits(points[v], a[v])) << v;
@@ -112,9 +113,9 @@ TEST_P(Mixes, threads_change_no_bit) {
     const Scene scene = scene_in_order(7, 20000);
     const auto weights = painted(8, scene.rest_points.size());
     const Deformer deformer(Binding(scene.data()), first(), MixData{second(), weights});
-    const auto expected = deformed(deformer, scene, {{}, 1});
+    const auto expected = deformed(deformer, scene, {1});
     for (std::size_t threads = 2; threads <= 5; ++threads) {
-        const auto points = deformed(deformer, scene, {{}, threads});
+        const auto points = deformed(deformer, scene, {threads});
         ASSERT_TRUE(same_bits(points, expected)) << threads;
     }
 }

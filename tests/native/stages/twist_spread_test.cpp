@@ -149,8 +149,9 @@ TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
                 TwistSpreadOptions options{0.9f, amounts, curves, {}, first, second};
                 if (are_known) options.channels = channels;
                 auto points = before;
-                EXPECT_TRUE(
-                    TwistSpread(Binding(scene.data()), data).apply(points, scene.posed_from_rest, options));
+                EXPECT_EQ(
+                    TwistSpread(Binding(scene.data()), data).apply(points, {scene.posed_from_rest}, options),
+                    Status::ok);
                 const auto expected = by_definition(scene, data, before, options);
                 EXPECT_LT(largest_error(points, expected), 40.0 * kTolerance);
                 EXPECT_GT(largest_error(before, expected), 0.1);
@@ -170,13 +171,13 @@ TEST_P(SpreadTwists, threads_change_no_bit_and_the_rest_pose_stays) {
         auto one = deformed(Deformer(scene.data(), Dq::info), scene);
         auto many = one;
         options.threads = 1;
-        EXPECT_TRUE(spread.apply(one, scene.posed_from_rest, options));
+        EXPECT_EQ(spread.apply(one, {scene.posed_from_rest}, options), Status::ok);
         options.threads = 5;
-        EXPECT_TRUE(spread.apply(many, scene.posed_from_rest, options));
+        EXPECT_EQ(spread.apply(many, {scene.posed_from_rest}, options), Status::ok);
         EXPECT_TRUE(same_bits(one, many));
         auto rest = scene.rest_points;
         // Without a pose, all bones are at rest.
-        EXPECT_TRUE(spread.apply(rest, {}, options));
+        EXPECT_EQ(spread.apply(rest, {}, options), Status::ok);
         EXPECT_TRUE(same_bits(rest, scene.rest_points));
     }
 }
@@ -190,20 +191,20 @@ TEST(TwistSpread, options_become_valid_and_wrong_sizes_change_nothing) {
         auto points = before;
         TwistSpreadOptions options;
         options.amount = amount;
-        EXPECT_TRUE(spread.apply(points, scene.posed_from_rest, options));
+        EXPECT_EQ(spread.apply(points, {scene.posed_from_rest}, options), Status::ok);
         return points;
     };
     EXPECT_TRUE(by(-1.0f) == before);
     EXPECT_TRUE(by(5.0f) == by(1.0f));
     EXPECT_TRUE(by(std::numeric_limits<float>::quiet_NaN()) == by(1.0f));
     std::vector<Vec3<float>> few(3, Vec3<float>(9.0f));
-    EXPECT_FALSE(spread.apply(few, scene.posed_from_rest));
+    EXPECT_EQ(spread.apply(few, {scene.posed_from_rest}), Status::size);
     EXPECT_TRUE(few == std::vector<Vec3<float>>(3, Vec3<float>(9.0f)));
     auto points = before;
     const std::vector<float> two(2, 1.0f);
     TwistSpreadOptions options;
     options.amounts = two;
-    EXPECT_FALSE(spread.apply(points, scene.posed_from_rest, options));
+    EXPECT_EQ(spread.apply(points, {scene.posed_from_rest}, options), Status::size);
     EXPECT_TRUE(points == before);
 }
 

@@ -312,7 +312,7 @@ std::vector<Vec3<float>> find_centres(const BindData& data, const NormalisedInfl
             centres[vertex] = mass > 0.0 ? Vec3<float>(origin + moment / mass) : data.rest_points[vertex];
         }
         const std::size_t all = done.fetch_add(end - begin, std::memory_order_relaxed) + end - begin;
-        job.go_on(0.5 + 0.5 * static_cast<double>(all) / static_cast<double>(centres.size()));
+        job.report_progress(0.5 + 0.5 * static_cast<double>(all) / static_cast<double>(centres.size()));
     });
     return centres;
 }
@@ -327,7 +327,7 @@ std::vector<Vec3<float>> centres_of_rotation(const BindData& data, std::span<con
     Collector collector(exact);
     for (std::size_t i = 0; i < triangles.size(); i += 3) {
         if (i / 3 % kTrianglesBetweenReports == 0 &&
-            !job.go_on(0.5 * static_cast<double>(i) / static_cast<double>(triangles.size()))) {
+            !job.report_progress(0.5 * static_cast<double>(i) / static_cast<double>(triangles.size()))) {
             return {};
         }
         std::array<Vec3<double>, 3> points;

@@ -47,7 +47,7 @@ struct SignedRows : CentreRows {
 
 /// The bones of a range of blocks, at least one, with rows in the form in which they are added.
 ///
-/// The last 12 numbers of a row apply to points in model space. Unless bones are added plainly, these are
+/// The last 12 numbers of a row apply to points in model space. Unless the sum of bones is absolute, these are
 /// differences from the first bone for all but the first; if signs are resolved, so are the quaternions.
 class MomentBones {
 public:
@@ -56,10 +56,10 @@ public:
           bones_(bones),
           from_model_(frame.spaces.bones_from_model),
           count(bone_count) {
-        // Palette::may_be_plain does not know the bones of moments.
-        is_plain = sinew::is_plain(palette_, bones, count);
+        // Palette::may_need_absolute_sum does not know the bones of moments.
+        is_absolute = sinew::needs_absolute_sum(palette_, bones, count);
         // Within 45 degrees of the first, all are within 90 degrees of each other.
-        is_resolved = !is_plain && count <= kMaxPrepared &&
+        is_resolved = !is_absolute && count <= kMaxPrepared &&
                       copy_aligned<SignedRows, true>(palette_, bones, count, rows_) > kCosine45;
         if (HWY_LIKELY(is_resolved)) {
             for (std::size_t k = 0; k < count; ++k) to_model(rows_ + kDdmNumbers * k);
@@ -69,7 +69,7 @@ public:
         load(0, rows_);
         for (std::size_t k = 1; k < prepared; ++k) load(k, rows_ + kDdmNumbers * k);
         resolve_signs();
-        for (std::size_t k = 1; k < prepared && !is_plain; ++k) {
+        for (std::size_t k = 1; k < prepared && !is_absolute; ++k) {
             subtract_first(rows_ + kDdmNumbers * k, is_resolved ? 0 : 4);
         }
     }
@@ -83,7 +83,7 @@ public:
     HWY_INLINE const float* row(std::size_t k, float* space) const {
         if (HWY_LIKELY(k < kMaxPrepared)) return rows_ + kDdmNumbers * k;
         load(k, space);
-        if (!is_plain) subtract_first(space, 4);
+        if (!is_absolute) subtract_first(space, 4);
         return space;
     }
 
@@ -130,7 +130,7 @@ private:
 
 public:
     std::size_t count;
-    bool is_plain = false;
+    bool is_absolute = false;
     bool is_resolved = false;
 };
 
@@ -221,7 +221,7 @@ HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
 /// centroid.
 ///
 /// kCount  the number of bones, or 0 for any number
-template <bool kFirst, bool kPlain, bool kResolved, std::size_t kCount, std::size_t kVectors, class D>
+template <bool kFirst, bool kAbsolute, bool kResolved, std::size_t kCount, std::size_t kVectors, class D>
 HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
                               const Points<D>* centroids, Motion<D>* motions) {
     alignas(64) float space[kDdmNumbers];
@@ -232,7 +232,7 @@ HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& r
         moved[v] = {zero, zero, zero};
         for (Vec<D>& number : motions[v].rotation) number = zero;
     }
-    if (!kPlain) {
+    if (!kAbsolute) {
         const float* const first = bones.row(0, space);
         Vec<D> one[kVectors];
         for (Vec<D>& weight : one) weight = hn::Set(d, 1.0f);
@@ -246,7 +246,7 @@ HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& r
         }
     }
     const std::size_t count = kCount > 0 ? kCount : bones.count;
-    for (std::size_t k = kPlain ? 0 : 1; k < count; ++k) {
+    for (std::size_t k = kAbsolute ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         Vec<D> weight[kVectors];
         Points<D> first[kVectors];
@@ -310,7 +310,7 @@ HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, con
 /// in model space.
 ///
 /// displacement  of the centroid
-template <bool kPlain, std::size_t kCount, class D>
+template <bool kAbsolute, std::size_t kCount, class D>
 HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows& rows,
                                 const Points<D>& centroid, const Points<D>& displacement,
                                 const float* from_model) {
@@ -325,20 +325,20 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
                                   sum.z = add_product(d, z, m, sum.z);
                               };
     if (from_model != nullptr) add_rows(from_model, from_model + 4, from_model + 8, total);
-    if (!kPlain) {
+    if (!kAbsolute) {
         const float* const first = bones.row(0, space);
         add_rows(first + 4, first + 8, first + 12, total);
     }
     const Vec<D> one = hn::Set(d, 1.0f);
     const Vec<D> zero = hn::Zero(d);
     const std::size_t count = kCount > 0 ? kCount : bones.count;
-    for (std::size_t k = kPlain ? 0 : 1; k < count; ++k) {
+    for (std::size_t k = kAbsolute ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         add_rows(row + 4, row + 8, row + 12, load_symmetric(d, rows.second, 6 + 6 * k));
         // The first moments about the centroid have sum 0, so only differences between bones count.
         Points<D> moved =
-            kPlain ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
-                   : Points<D>{zero, zero, zero};
+            kAbsolute ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
+                      : Points<D>{zero, zero, zero};
         add_moved<1>(d, row, &centroid, &one, &moved);
         const Vec<D> weight = load_weight(d, rows, k);
         const Points<D> by = add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
@@ -532,7 +532,7 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
 }
 
 /// Deforms lanes [lane, lane + kVectors * N) of a block.
-template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0, std::size_t kVectors = 1,
+template <Variant kVariant, bool kAbsolute, bool kResolved, std::size_t kCount = 0, std::size_t kVectors = 1,
           class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
@@ -545,12 +545,12 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
         blend_motions<kVectors, kCount, false>(d, bones.rows(), bones.count, nullptr,
                                                rows.weight + 3 * kLanes, centroids, motions);
     } else {
-        blend_moments<kVariant != Variant::weights, kPlain, kResolved, kCount, kVectors>(d, bones, rows,
-                                                                                         centroids, motions);
+        blend_moments<kVariant != Variant::weights, kAbsolute, kResolved, kCount, kVectors>(
+            d, bones, rows, centroids, motions);
     }
     if constexpr (kVariant == Variant::nearest) {
-        const Rows3<D> matrix = correlation<kPlain, kCount>(d, bones, rows, centroids[0],
-                                                            motions[0].displacement, spaces.bones_from_model);
+        const Rows3<D> matrix = correlation<kAbsolute, kCount>(
+            d, bones, rows, centroids[0], motions[0].displacement, spaces.bones_from_model);
         to_nearest(d, matrix, is_point_at(d, rows.second, centroids[0]), spaces.bones_from_model,
                    motions[0].rotation);
     }
@@ -567,7 +567,7 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
 /// Deforms blocks [begin, end) with the same bones.
 ///
 /// kCount  the number of bones, or 0 for any number
-template <Variant kVariant, bool kPlain, bool kResolved, std::size_t kCount = 0>
+template <Variant kVariant, bool kAbsolute, bool kResolved, std::size_t kCount = 0>
 void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t begin, std::size_t end) {
     const Full d;
     // The matrices of variant 0 leave no registers for a second vector.
@@ -579,10 +579,11 @@ void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t beg
         if (kVariant == Variant::nearest) prefetch_moments(frame, b + 1);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
             if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
-                deform_lanes<kVariant, kPlain, kResolved, kCount>(d, frame, pointers, spaces, bones, b, lane);
+                deform_lanes<kVariant, kAbsolute, kResolved, kCount>(d, frame, pointers, spaces, bones, b,
+                                                                     lane);
             } else {
-                deform_lanes<kVariant, kPlain, kResolved, kCount, kVectors>(d, frame, pointers, spaces, bones,
-                                                                            b, lane);
+                deform_lanes<kVariant, kAbsolute, kResolved, kCount, kVectors>(d, frame, pointers, spaces,
+                                                                               bones, b, lane);
             }
         }
     }
@@ -592,7 +593,8 @@ template <Variant kVariant>
 void deform_set_of(const Frame& frame, std::size_t begin, std::size_t end) {
     const MomentBlock& block = moments_of(frame).blocks[begin];
     const MomentBones bones(frame, &moments_of(frame).bones[block.first_bone], block.bones);
-    if (HWY_UNLIKELY(bones.is_plain)) return deform_blocks<kVariant, true, false>(frame, bones, begin, end);
+    if (HWY_UNLIKELY(bones.is_absolute))
+        return deform_blocks<kVariant, true, false>(frame, bones, begin, end);
     if (!bones.is_resolved) return deform_blocks<kVariant, false, false>(frame, bones, begin, end);
     switch (bones.count) {
         case 1: return deform_blocks<kVariant, false, true, 1>(frame, bones, begin, end);
@@ -613,7 +615,7 @@ void deform_lane_by_lane(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < pointers.blocks[b].vertices; ++lane) {
         const std::size_t first = block.first_bone + (block.own_bones ? block.bones * lane : 0);
         const MomentBones bones(frame, &moments_of(frame).bones[first], block.bones);
-        if (bones.is_plain) {
+        if (bones.is_absolute) {
             deform_lanes<kVariant, true, false>(d, frame, pointers, spaces, bones, b, lane);
         } else if (bones.is_resolved) {
             deform_lanes<kVariant, false, true>(d, frame, pointers, spaces, bones, b, lane);

@@ -376,7 +376,7 @@ std::vector<float> find_moments(const BindData& data, std::span<const std::int32
     const WeightsByBone by_bone = weights_by_bone(influences);
     const Smoothing smoothing = smoothing_of(data.rest_points, triangles, radius);
     const Solver solver(smoothing.step);
-    if (!job.go_on(kShareOfFactor)) return {};
+    if (!job.report_progress(kShareOfFactor)) return {};
 
     // Relative to the mesh's middle, so that a mesh far from the origin loses no digits.
     std::vector<Vec3<double>> points(data.rest_points.begin(), data.rest_points.end());
@@ -400,7 +400,7 @@ std::vector<float> find_moments(const BindData& data, std::span<const std::int32
     const auto go_on = [&] {
         const auto share =
             static_cast<double>(done.load(std::memory_order_relaxed)) / static_cast<double>(kSteps * groups);
-        return job.go_on(kShareOfFactor + (1.0 - kShareOfFactor) * share);
+        return job.report_progress(kShareOfFactor + (1.0 - kShareOfFactor) * share);
     };
     job.for_each(groups, 1, [&](std::size_t begin, std::size_t end) {
         BoneSmoother smoother(solver, smoothing.mass, points);

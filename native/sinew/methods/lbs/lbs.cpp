@@ -103,11 +103,11 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
 /// Deforms lanes [lane, lane + kVectors * N) of block `b`, whose vertices have the same bones.
 ///
 /// rest      its rest points from these lanes on, kLanes apart
-/// weights   the same for its weights, without those of the first bone
+/// weights   its weights from these lanes on, kLanes apart, without those of the first bone
 /// first     columns of the first bone
-/// other_of  other_of(k) is the difference of the k-th bone from the first; if plain, the k-th bone
+/// other_of  other_of(k) is the difference of the k-th bone from the first; if kAbsolute, the k-th bone
 /// kCount    the number of influences, or 0 for `count`
-template <std::size_t kCount, std::size_t kVectors, bool kPlain, class D, class OtherOf>
+template <std::size_t kCount, std::size_t kVectors, bool kAbsolute, class D, class OtherOf>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b,
                              std::size_t lane, const float* rest, const float* weights, std::size_t count,
                              const float* first, const OtherOf& other_of) {
@@ -118,12 +118,12 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     for (std::size_t v = 0; v < kVectors; ++v, rest += step) {
         sum[v] = p[v] = {hn::Load(d, rest), hn::Load(d, rest + kLanes), hn::Load(d, rest + 2 * kLanes)};
     }
-    if constexpr (kPlain) {
+    if constexpr (kAbsolute) {
         for (std::size_t v = 0; v < kVectors; ++v) {
             weight[v] = hn::Load(d, first_weights_of(frame, b) + lane + v * step);
         }
     }
-    add_bone<kVectors, kPlain>(d, Columns{first}, weight, p, sum);
+    add_bone<kVectors, kAbsolute>(d, Columns{first}, weight, p, sum);
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
         for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
         weights += kLanes;
@@ -136,7 +136,7 @@ HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
     return frame.palette->bones[kLbsColumns * static_cast<std::size_t>(bone)].value.data();
 }
 
-template <std::size_t kCount, bool kPlain, class OtherOf>
+template <std::size_t kCount, bool kAbsolute, class OtherOf>
 HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
                             const OtherOf& other_of) {
     const Full d;
@@ -150,8 +150,8 @@ HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t e
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
-            deform_lanes<kCount, kVectors, kPlain>(d, frame, pointers, b, lane, rest + lane, weights + lane,
-                                                   count, first, other_of);
+            deform_lanes<kCount, kVectors, kAbsolute>(d, frame, pointers, b, lane, rest + lane,
+                                                      weights + lane, count, first, other_of);
         }
         rest += kLanes * kPointRows;
         weights += kLanes * (count - 1);
@@ -183,8 +183,8 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     });
 }
 
-/// The same for bones that are added plainly.
-inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t end) {
+/// Deforms blocks [begin, end) with the same bones, by their absolute sum (Palette).
+inline void deform_absolute_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
     deform_each<0, true>(frame, begin, end, columns_of_bone(frame, bones[0]),
                          [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k])}; });
@@ -192,12 +192,12 @@ inline void deform_plain_set(const Frame& frame, std::size_t begin, std::size_t 
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// Deforms one vertex, with x, y and z in the lanes: the same operations in the same order.
+/// Deforms one vertex, with x, y and z in the lanes: its operations are those of a vertex in deform_lanes(), in their order.
 ///
 /// rest     the vertex's rest point: numbers kLanes apart
-/// weights  its weights, likewise
+/// weights  its weights: numbers kLanes apart
 /// to       the vertex's point
-template <bool kPlain>
+template <bool kAbsolute>
 HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
                               const float* rest, const float* weights, Vec3<float>* to) {
     const Four four;
@@ -214,13 +214,13 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
     const float* const stored_first = columns_of_bone(frame, bones[0]);
     for (std::size_t c = 0; c < kLbsColumns; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
     const V4 by_first = moved_by(first);
-    sum = kPlain ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
+    sum = kAbsolute ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
     for (std::size_t k = 1; k < count; ++k) {
         const float* const stored = columns_of_bone(frame, bones[k]);
         V4 columns[kLbsColumns];
         for (std::size_t c = 0; c < kLbsColumns; ++c) {
             columns[c] = hn::Load(four, stored + 4 * c);
-            if (!kPlain) columns[c] = hn::Sub(columns[c], first[c]);
+            if (!kAbsolute) columns[c] = hn::Sub(columns[c], first[c]);
         }
         sum = hn::MulAdd(hn::Set(four, weights[kLanes * k]), moved_by(columns), sum);
     }
@@ -230,8 +230,9 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
 }
 
 /// Not inlined, so that its registers do not burden the usual case.
-inline HWY_NOINLINE void deform_plain_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
-                                             const float* rest, const float* weights, Vec3<float>* to) {
+inline HWY_NOINLINE void deform_vertex_absolutely(const Frame& frame, const std::int32_t* bones,
+                                                  std::size_t count, const float* rest, const float* weights,
+                                                  Vec3<float>* to) {
     deform_vertex<true>(frame, bones, count, rest, weights, to);
 }
 
@@ -242,8 +243,8 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
         Vec3<float>* const to = frame.points + frame.mesh->vertices[b].lane[lane];
-        if (is_added_plainly(*frame.palette, bones, block.influences)) {
-            deform_plain_vertex(frame, bones, block.influences, rest + lane, weights + lane, to);
+        if (is_summed_absolutely(*frame.palette, bones, block.influences)) {
+            deform_vertex_absolutely(frame, bones, block.influences, rest + lane, weights + lane, to);
         } else {
             deform_vertex<false>(frame, bones, block.influences, rest + lane, weights + lane, to);
         }
@@ -259,18 +260,18 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const float* const weights = weights_of(pointers, b);
     for (std::size_t lane = 0; lane < block.vertices; ++lane) {
         const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
-        const bool plain = is_added_plainly(*frame.palette, bones, block.influences);
+        const bool is_absolute = is_summed_absolutely(*frame.palette, bones, block.influences);
         const Points<One> p = load_points(d, pointers, b, lane);
         Points<One> sum = p;
         const Columns first{columns_of_bone(frame, bones[0])};
         const Vec<One> weight_of_first = hn::Load(d, weights + lane);
-        plain ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
-              : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
+        is_absolute ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
+                    : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
         for (std::size_t k = 1; k < block.influences; ++k) {
             const float* const columns = columns_of_bone(frame, bones[k]);
             const Vec<One> weight = hn::Load(d, weights + kLanes * k + lane);
-            plain ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
-                  : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
+            is_absolute ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
+                        : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
         }
         store_points(d, pointers, b, lane, sum);
     }
@@ -280,8 +281,8 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
 
 void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     const Block& block = frame.mesh->blocks[begin];
-    if (is_added_plainly(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
-        return deform_plain_set(frame, begin, end);
+    if (is_summed_absolutely(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
+        return deform_absolute_set(frame, begin, end);
     }
     // With a fixed count the loop is unrolled.
     switch (block.influences) {
@@ -313,7 +314,7 @@ void rows_in_model(const Bones& bones, Palette& palette) {
     // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
     for (std::size_t i = 0; i < used.size(); ++i) {
-        const float* const from = &bones.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+        const float* const from = &bones.pose.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
         float* const to = palette.bones[kLbsColumns * i].value.data();
         auto squares = hn::Zero(d);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -327,8 +328,8 @@ void rows_in_model(const Bones& bones, Palette& palette) {
         hn::Store(translation, d, to + 12);
         const float size = hn::GetLane(hn::SumOfLanes(d, hn::Mul(translation, translation)));
         const float length = hn::GetLane(hn::SumOfLanes(d, squares));
-        palette.sizes[i] =
-            length < kLong ? std::max(size, kMinSize * kMinSize) : std::numeric_limits<float>::infinity();
+        palette.sizes[i] = length < kMaxStretchSquared ? std::max(size, kMinSize * kMinSize)
+                                                       : std::numeric_limits<float>::infinity();
     }
 }
 
@@ -339,8 +340,8 @@ void rows_in_model(const Bones& bones, Palette& palette) { linear_rows_between_s
 #endif
 
 void bone_rows(const Bones& bones, Palette& palette) {
-    is_identity(bones.bones_from_model) ? rows_in_model(bones, palette)
-                                        : linear_rows_between_spaces(bones, palette);
+    is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
+                                             : linear_rows_between_spaces(bones, palette);
 }
 
 }  // namespace
@@ -354,10 +355,10 @@ namespace sinew {
 static constexpr Float4 kRestRow[HWY_NAMESPACE::kLbsColumns] = {};
 
 void linear_rows_between_spaces(const Bones& bones, Palette& palette) {
-    const auto bones_from_model = cast<double>(bones.bones_from_model);
+    const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
     const Affine<double> model_from_bones = inverse(bones_from_model);
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
-        const Affine<float>& posed = bones.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
+        const Affine<float>& posed = bones.pose.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
         const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
         const Mat3<double> m = motion.linear - Mat3<double>(1.0);
         Float4* const columns = &palette.bones[std::size(kRestRow) * i];

@@ -92,21 +92,22 @@ struct BulgeLimit::State {
 BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
     : state_(make_owned<State>(binding, data)) {}
 
-bool BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
-                                 const Affine<float>& bones_from_model) noexcept {
-    if (!are_points(rest_points, vertex_count()) || !is_space(bones_from_model)) return false;
+Status BulgeLimit::set_rest_points(std::span<const Vec3<float>> rest_points,
+                                   const Affine<float>& bones_from_model) noexcept {
+    const Status status = status_of_rest(rest_points, vertex_count(), bones_from_model);
+    if (status != Status::ok) return status;
     const std::scoped_lock lock(state_->mutex);
     state_->measure(rest_points, bones_from_model);
-    return true;
+    return Status::ok;
 }
 
 std::size_t BulgeLimit::vertex_count() const noexcept { return state_->packed->vertex_count; }
 std::size_t BulgeLimit::bone_count() const noexcept { return state_->packed->bone_count; }
 
-bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-                       const BulgeLimitOptions& options) const noexcept {
+Status BulgeLimit::apply(std::span<Vec3<float>> points, const Pose& pose,
+                         const BulgeLimitOptions& options) const noexcept {
     const State& state = *state_;
-    if (points.size() != vertex_count()) return false;
+    if (points.size() != vertex_count()) return Status::size;
     const std::scoped_lock lock(state.mutex);
     bool is_stretched = false;
     for (std::size_t i = 0; i < state.bones.size(); ++i) {
@@ -114,7 +115,7 @@ bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
                                        Vec3<double>(state.segments[i].tail)};
         const auto number = static_cast<std::size_t>(state.mesh.used_bones[i]);
         Affine<double> motion{};
-        if (number < posed_from_rest.size()) motion = cast<double>(posed_from_rest[number]);
+        if (number < pose.posed_from_rest.size()) motion = cast<double>(pose.posed_from_rest[number]);
         const double stretch =
             is_orthonormal(motion.linear) ? 1.0 : BulgeLimitStage::stretch(motion.linear, rest);
         is_stretched = is_stretched || stretch != 1.0;
@@ -128,7 +129,7 @@ bool BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<flo
     parallel_for_blocks(state.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {
         kBulgeKernel.limit[target_in_use()](frame, begin, end);
     });
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

@@ -194,7 +194,7 @@ public:
 private:
     [[nodiscard]] std::size_t begin(std::size_t part) const noexcept { return chunks_ * part / parts_; }
 
-    /// Runs what needs no chunk of another part, which is less with each iteration.
+    /// Runs the part's trapezoid: iteration i skips i * reach chunks at each inner border.
     template <class Run>
     void run_part(std::size_t part, std::size_t count, const Run& run) const {
         const std::size_t first = begin(part);
@@ -209,7 +209,7 @@ private:
         }
     }
 
-    /// Runs what is then missing between a part and the next.
+    /// Runs the chunks that run_part() skipped at the border between a part and the next.
     template <class Run>
     void run_between(std::size_t part, std::size_t count, const Run& run) const {
         const std::size_t middle = begin(part + 1);
@@ -260,10 +260,10 @@ std::size_t DeltaMush::iterations() const noexcept {
     return state_->bound->iterations;
 }
 
-bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
+Status DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t threads) const noexcept {
     const State& state = *state_;
     const MushMesh& mesh = state.mesh;
-    if (points.size() != mesh.vertices.size()) return false;
+    if (points.size() != mesh.vertices.size()) return Status::size;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
     // Read once, because the compiler assumes that any stored number may change it.
@@ -286,7 +286,7 @@ bool DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t th
         kMushKernel.finish[target_in_use()](frame, begin, end);
     };
     parallel_for(mesh.chunk_count(), threads, finish, 1);
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

@@ -123,7 +123,7 @@ HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t l
     return in_all_lanes(d, numbers);
 }
 
-/// The same for arbitrary points: index_of(vertex) returns the index of the point.
+/// One point for each lane, from anywhere: index_of(vertex) returns the index of the point.
 template <class D, class Index>
 HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
     return consecutive_points(d, points + static_cast<std::size_t>(index_of(vertex_of(lane))), 0);
@@ -178,7 +178,7 @@ HWY_INLINE Vec<D> collected(D d, const Float4* points, const Index& index_of, st
     }
 }
 
-/// The same for arbitrary points: index_of(vertex) returns the index of the point.
+/// One point for each lane, from anywhere: index_of(vertex) returns the index of the point.
 template <class D, class Index>
 HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
     return to_lanes(

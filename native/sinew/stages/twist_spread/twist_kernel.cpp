@@ -66,15 +66,15 @@ HWY_INLINE Points<D> spun(D d, const TwistLine& line, const Turned<D>& by, const
     return swept(d, line.axes, by, arm_of(d, line, 0, p), arm_of(d, line, 1, p));
 }
 
-/// TwistSpreadStage::left_out(), lane by lane: few frames need it.
+/// TwistSpreadStage::missing_turns(), lane by lane: few frames need it.
 template <class D>
-HWY_INLINE Vec<D> left_out(D d, TwistBlend blend, const TwistedBone& bone, Vec<D> below, Vec<D> mask) {
+HWY_INLINE Vec<D> missing_turns(D d, TwistBlend blend, const TwistedBone& bone, Vec<D> below, Vec<D> mask) {
     alignas(64) float values[kLanes];
     alignas(64) float masks[kLanes];
     hn::Store(below, d, values);
     hn::Store(mask, d, masks);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-        values[i] = TwistSpreadStage::left_out(blend, bone.around, values[i], masks[i] * bone.part);
+        values[i] = TwistSpreadStage::missing_turns(blend, bone.around, values[i], masks[i] * bone.part);
     }
     return hn::Load(d, values);
 }
@@ -132,7 +132,7 @@ HWY_INLINE void twist_by(D d, const TwistFrame& frame, const BlockTwist& twist, 
         const Vec<D> weight = load(twist.weight);
         Vec<D> posed_angle = hn::Mul(weight, angle);
         if (frame.goes_around) {
-            const Vec<D> turns = left_out(d, blend, bone, load(twist.below), of.mask);
+            const Vec<D> turns = missing_turns(d, blend, bone, load(twist.below), of.mask);
             posed_angle = hn::MulAdd(turns, hn::Set(d, std::numbers::pi_v<float>), posed_angle);
         }
         const bool is_short = bone.is_short && !frame.goes_around;

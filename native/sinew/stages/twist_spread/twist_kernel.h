@@ -21,7 +21,7 @@ struct TwistRest {
     float share[4];  // of a rest point (x, y, z, 1): 0 at the head, 1 at the tail
 };
 
-/// The same bone in one frame.
+/// A bone of TwistRest in one frame.
 struct TwistedBone {
     bool is_twisted = false;  // if not, nothing else is set
     bool is_scaled;
@@ -32,9 +32,9 @@ struct TwistedBone {
     float displacement[12];  // the bone's motion, as in write_displacement()
     float curve;
     float angle;   // half of it, radians
-    float offset;  // likewise, added to the angle times the share
+    float offset;  // radians, added to the angle times the share
     float around;  // as in TwistSpreadStage::Bone
-    float part;    // the same
+    float part;    // as in TwistSpreadStage::Bone
 };
 
 /// What a twist has to do with the vertices of a block.
@@ -42,7 +42,7 @@ struct BlockTwist {
     Lanes<float> share{};     // 0 at the bone's head, 1 at its tail
     Lanes<float> arms[2]{};   // the vertex's distances from the line along the axes, times `weight`
     Lanes<float> weight{};    // of the bone
-    Lanes<float> below{};     // as for TwistSpreadStage::left_out()
+    Lanes<float> below{};     // argument of TwistSpreadStage::missing_turns()
     std::size_t twist;        // into TwistFrame::bones
     bool has_weight = false;  // else bones beyond the twist share vertices with others
 };
@@ -63,9 +63,9 @@ struct TwistFrame {
     const TwistRest* rest;        // [twists] of measure
     const TwistedBone* bones;     // [twists]
     const Lanes<float>* weights;  // [PackedMesh::blocks]; null if all are 1
-    const Lanes<float>* mix;      // the same; null if all are 0
+    const Lanes<float>* mix;      // [PackedMesh::blocks]; null if all are 0
     TwistBlend blend = TwistBlend::linear;
-    TwistBlend mix_blend = TwistBlend::linear;  // the same without a mix, and where it would not matter
+    TwistBlend mix_blend = TwistBlend::linear;  // equals `blend` without a mix, and where it would not matter
     bool is_linear = true;                      // all blends are
     bool goes_around = false;  // a bone is farther than the shorter way, and a method blends the shorter way
     Spaces spaces;

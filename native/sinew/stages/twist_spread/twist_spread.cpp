@@ -256,7 +256,7 @@ struct TwistSpread::State {
     std::vector<BlockTwist> block_twists;
     std::vector<Lanes<float>> own_rest_points;  // empty: use those of the binding
     std::vector<Lanes<float>> weights;          // [PackedMesh::blocks], or empty
-    std::vector<Lanes<float>> mix;              // the same
+    std::vector<Lanes<float>> mix;              // [PackedMesh::blocks], or empty
     SpaceRows space_rows{Affine<float>{}};
     mutable std::vector<TwistedBone> bones;  // [twists] scratch for one call
     mutable ForkSafeMutex mutex;
@@ -265,13 +265,15 @@ struct TwistSpread::State {
 TwistSpread::TwistSpread(const Binding& binding, const TwistSpreadData& data)
     : state_(make_owned<State>(binding, data)) {}
 
-bool TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
-                                  const Affine<float>& bones_from_model) noexcept {
-    if (!are_points(rest_points, vertex_count()) || !is_space(bones_from_model)) return false;
+Status TwistSpread::set_rest_points(std::span<const Vec3<float>> rest_points,
+                                    const Affine<float>& bones_from_model) noexcept {
+    Status status = status_of_rest(rest_points, vertex_count(), bones_from_model);
+    if (status != Status::ok) return status;
     const std::scoped_lock lock(state_->mutex);
-    if (!set_own_points(state_->mesh, rest_points, state_->own_rest_points)) return false;
+    status = set_own_points(state_->mesh, rest_points, state_->own_rest_points);
+    if (status != Status::ok) return status;
     state_->measure(bones_from_model);
-    return true;
+    return Status::ok;
 }
 
 std::size_t TwistSpread::vertex_count() const noexcept { return state_->packed->vertex_count; }
@@ -292,20 +294,20 @@ std::vector<float> TwistSpread::angles(std::span<const Affine<float>> posed_from
     return angles;
 }
 
-bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
-                        const TwistSpreadOptions& options) const noexcept {
+Status TwistSpread::apply(std::span<Vec3<float>> points, const Pose& pose,
+                          const TwistSpreadOptions& options) const noexcept {
     const State& state = *state_;
     const auto fits = [&](std::size_t size) { return size == 0 || size == state.twists.size(); };
     if (points.size() != vertex_count() || !fits(options.amounts.size()) || !fits(options.curves.size()) ||
         !fits(options.channels.size())) {
-        return false;
+        return Status::size;
     }
     const std::scoped_lock lock(state.mutex);
     TwistFrame frame = state.frame(points.data());
     frame.blend = options.blend;
     frame.mix_blend = state.mix.empty() ? options.blend : options.mix_blend;
     frame.is_linear = frame.blend == TwistBlend::linear && frame.mix_blend == TwistBlend::linear;
-    if (!state.prepare(posed_from_rest, options, frame.is_linear)) return true;
+    if (!state.prepare(pose.posed_from_rest, options, frame.is_linear)) return Status::ok;
     const auto goes_short = [](TwistBlend blend) {
         return blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
     };
@@ -320,7 +322,7 @@ bool TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<fl
         state.blocks.size(), useful_threads(options.threads, vertices, kVerticesWorthAThread),
         [&](std::size_t begin, std::size_t end) { kTwistKernel.spread[target_in_use()](frame, begin, end); },
         kBlocksOfAChunk);
-    return true;
+    return Status::ok;
 }
 
 }  // namespace sinew

@@ -136,13 +136,13 @@ struct TwistSpreadStage {
         return rotate(quat_from_axis_angle(axis, T(2) * std::numbers::pi_v<T> * turns), arm) - arm;
     }
 
-    /// The turns that a blend the shorter way leaves out where bones are `around` turns farther apart. There is nothing
+    /// The turns that shortest-path blending drops where bones are `around` whole turns farther apart. There is nothing
     /// between one way round and the other: the greater part decides.
     ///
     /// below  the weights of the bones beyond the twist, of all weights
     /// part   of the twist that is spread
     template <class T>
-    [[nodiscard]] static T left_out(TwistBlend blend, T around, T below, T part) noexcept {
+    [[nodiscard]] static T missing_turns(TwistBlend blend, T around, T below, T part) noexcept {
         const bool is_short = blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
         if (!is_short || !(below > T(0)) || !(below < T(1)) || !(part > T(0.5))) return T(0);
         if (blend == TwistBlend::logarithms) return around * below;
@@ -180,20 +180,20 @@ struct TwistSpreadStage {
         const Vec3<T> origin = transform_point(bone.motion, bone.origin);
         const Vec3<T> axis =
             (glm::determinant(bone.motion.linear) < T(0) ? T(-1) : T(1)) / length * posed_axis;
-        const T missing = left_out(blend, bone.around, below, mask * bone.part);
+        const T missing = missing_turns(blend, bone.around, below, mask * bone.part);
         const Vec3<T> by = spun(origin, axis, weight * turns + missing, point);
         if (!bone.is_scaled) return by;
         // A scaled bone keeps its scaled shape: a vertex of this bone alone is moved by M R(turns).
         return by + weight * (own - spun(origin, axis, turns, transform_point(bone.motion, rest)));
     }
 
-    /// The vertex after twisting by one bone. Those of a vertex follow each other, the last in TwistSpreadData first.
+    /// The vertex after twisting by one bone. Call per bone, in reverse order of TwistSpreadData::twists.
     /// A point that mixes two methods mixes what the twist adds to the points of each.
     ///
     /// blend, mix_blend  of the first and of the second method
     /// mix     the share of the second, 0 to 1
     /// weight  of the bone
-    /// below   as for left_out()
+    /// below   the weights of the bones beyond the twist, of all weights
     /// mask    of the vertex, 0 to 1
     template <class T>
     [[nodiscard]] static Vec3<T> deform_vertex(const Bone<T>& bone, TwistBlend blend, TwistBlend mix_blend,

@@ -8,7 +8,7 @@
 #include "sinew/lanes/palette.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/lanes/plain_bones.cpp"
+#define HWY_TARGET_INCLUDE "sinew/lanes/absolute_sums.cpp"
 #include "hwy/foreach_target.h"
 //
 #include "hwy/highway.h"
@@ -19,20 +19,20 @@ namespace HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Sets Palette::may_be_plain for each first bone with a pair that would be added plainly.
-void mark_plain(const BonePairs& pairs, Palette& palette) {
+/// Sets Palette::may_need_absolute_sum for each first bone with a pair that needs an absolute sum.
+void mark_absolute_sums(const BonePairs& pairs, Palette& palette) {
     const hn::CappedTag<float, kLanes> d;
     const hn::RebindToSigned<decltype(d)> indices;
-    const auto alike = hn::Set(d, kAlike * kAlike);
+    const auto ratio = hn::Set(d, kMaxSizeRatio * kMaxSizeRatio);
     for (std::size_t i = 0; i < pairs.first.size(); i += hn::Lanes(d)) {
         const std::int32_t* const bones = &pairs.first[i];
         const auto first = hn::GatherIndex(d, palette.sizes, hn::LoadU(indices, bones));
         const auto later = hn::GatherIndex(d, palette.sizes, hn::LoadU(indices, &pairs.later[i]));
         std::uint8_t bits[8] = {};
-        hn::StoreMaskBits(d, hn::Not(hn::Lt(first, hn::Mul(alike, later))), bits);
-        for (auto plain = static_cast<std::uint32_t>(bits[0] | bits[1] << 8); plain != 0;
-             plain &= plain - 1) {
-            palette.may_be_plain[bones[std::countr_zero(plain)]] = 1;
+        hn::StoreMaskBits(d, hn::Not(hn::Lt(first, hn::Mul(ratio, later))), bits);
+        for (auto pairs_left = static_cast<std::uint32_t>(bits[0] | bits[1] << 8); pairs_left != 0;
+             pairs_left &= pairs_left - 1) {
+            palette.may_need_absolute_sum[bones[std::countr_zero(pairs_left)]] = 1;
         }
     }
 }
@@ -45,9 +45,9 @@ HWY_AFTER_NAMESPACE();
 
 namespace sinew {
 
-void find_plain(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept {
-    static constexpr OfTargets<void(const BonePairs&, Palette&)> kMark SINEW_TARGETS(mark_plain);
-    std::fill_n(palette.may_be_plain, bones, std::uint8_t{0});
+void find_absolute_sums(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept {
+    static constexpr OfTargets<void(const BonePairs&, Palette&)> kMark SINEW_TARGETS(mark_absolute_sums);
+    std::fill_n(palette.may_need_absolute_sum, bones, std::uint8_t{0});
     kMark[target_in_use()](pairs, palette);
 }
 
