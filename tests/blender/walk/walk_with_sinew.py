@@ -192,6 +192,7 @@ class SinewSide(Side):
             f"in front of {modifier.name} Blender permits",
             "its armature was deleted",
             "is a Multi Modifier",
+            "is a simulation",
         )
         if not any(sentence in said for sentence in sentences):
             raise ValueError(f"{obj.name}: nothing says that Sinew can not be in front of {modifier.name}")
