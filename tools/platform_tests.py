@@ -35,7 +35,7 @@ NATIVE: dict[str, list[str | Path]] = {
 # Shapes compared with Blender's, Sinew added and removed, files saved and read, bakes, commands, batches
 # with kills.
 BLENDER_TESTS = (
-    *("deform/test_against_armature_modifier", "deform/test_changes", "commands/test_restore"),
+    *("deform/test_against_armature_modifier", "deform/test_editing", "commands/test_restore"),
     *("attach/test_saved_files", "features/bake/test_bake", "commands/test_command_line", "jobs/test_batch"),
 )
 # Single tests that do not run there, each with the reason.

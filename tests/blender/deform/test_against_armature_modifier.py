@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Blender's Armature modifier is the oracle: linear for lbs, Preserve Volume for dq. What random rigs in a
-pose have is in test_fuzz; here are real rigs, frames, modes and what is switched meanwhile."""
+pose have is in the fuzzer; here are real rigs, frames, modes and what is switched meanwhile."""
 
 from __future__ import annotations
 

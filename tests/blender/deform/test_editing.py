@@ -1,20 +1,24 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Edits of a character that Sinew deforms, after which it still follows its armature."""
+"""Edits of a character that Sinew deforms, after which it still follows its armature, also those about which
+Blender does not notify Sinew."""
 
 from __future__ import annotations
 
+import threading
 from functools import partial
 
 import bpy
 import numpy as np
 import pytest
+import routes
 import scenes
 import whole_file
-from sinew_addon.attach import attach, modifier_types, other_tools, point_store, properties
+from sinew_addon.attach import attach, layout, modifier_types, other_tools, point_store, properties
+from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.base.errors import SinewError
-from sinew_addon.deform import safe_mode, session, survey
+from sinew_addon.deform import characters, in_depsgraph, safe_mode, session, survey, update
 from sinew_addon.deform.plan import State
-from sinew_addon.io import armature_io
+from sinew_addon.io import actions, armature_io, mesh_io
 from sinew_addon.ui import state_text
 
 pytestmark = pytest.mark.both_ways
@@ -153,7 +157,7 @@ def test_hooks_behind_take_a_vertex_group(has_group):
 
 
 def test_nothing_is_left_where_blender_alone_knows_that_sinew_can_not_be_added(monkeypatch):
-    """A sculpted character; test_fuzz.py and test_scripted_walks.py have what Sinew knows, too."""
+    """A sculpted character; the fuzzer and test_scripted_walks.py have what Sinew knows, too."""
     monkeypatch.setattr(modifier_types, "NEED_ORIGINAL_MESH", frozenset())
     obj, armature = scenes.make_arm()
     scenes.deform_by_parent(obj, armature)
@@ -190,3 +194,286 @@ def test_warnings_of_modifiers_that_act_differently_behind_sinew(kind, in_front)
     assert [bool(sentences) for sentences in (before, other_tools.warnings(obj))] == [is_warned, is_warned]
     assert (before == [s for s in state_text.problems_of(obj) if "behind Sinew's" in s]) or not is_warned
     assert is_warned == ("behind Sinew's" in " ".join(survey.describe_in_file(obj).warnings))
+
+
+# --- Without a sign from Blender; each caused a fault once
+
+
+def test_swapped_bone_names_swap_the_groups():
+    obj, armature = scenes.skinned_arm()
+    bones = armature.data.bones
+    bones["bone.0"].name = "x"
+    bones["bone.1"].name = "bone.0"
+    bones["x"].name = "bone.1"
+    bpy.context.view_layer.update()
+    assert [group.name for group in obj.vertex_groups] == ["bone.1", "bone.0"]
+    assert_follows(obj)
+
+
+def test_a_bone_renamed_and_another_made_in_one_edit():
+    obj, armature = scenes.skinned_arm()
+    scenes.enter(armature, "EDIT")
+    bpy.context.view_layer.update()
+    armature.data.edit_bones["bone.1"].name = "forearm"
+    extra = armature.data.edit_bones.new("extra")
+    extra.head, extra.tail = (0, 0, 1), (0, 0, 2)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    assert [group.name for group in obj.vertex_groups] == ["bone.0", "forearm"]
+    assert_follows(obj)
+
+
+@pytest.mark.parametrize("heat", [False, True])
+def test_while_off_the_mesh_has_no_attribute_of_sinews(heat):
+    obj, _armature = scenes.skinned_arm("qv")
+    properties.of(obj).heat = heat
+    frames = [3, 7]
+    shown = scenes.shapes(obj, frames)
+
+    def ours() -> list[str]:
+        return [attribute.name for attribute in obj.data.attributes if "sinew" in attribute.name]
+
+    # The points of a mesh with a heat map are stored in a separate object.
+    assert len(ours()) == (not heat)
+    for _again in range(2):
+        properties.of(obj).enabled = False
+        bpy.context.scene.frame_set(5)
+        assert ours() == []
+        properties.of(obj).enabled = True
+        assert np.array_equal(scenes.shapes(obj, frames), shown)
+        assert len(ours()) == (not heat)
+
+
+def test_points_that_are_never_requested_are_deformed_after_the_update(monkeypatch):
+    obj, _armature = scenes.skinned_arm("dq")
+    expected = scenes.shapes(obj, [3, 6, 11])
+    monkeypatch.setattr(session.requests, "mesh_requested", lambda _mesh: None)
+    monkeypatch.setattr(properties.listeners, "mesh_requested", lambda _mesh: None)
+    scenes.shapes(obj, [1, 2])
+    assert np.array_equal(scenes.shapes(obj, [3, 6, 11]), expected)
+    state = session.state_of(obj)
+    assert state.plan.state is State.AFTER_UPDATE
+    assert update.NOT_REQUESTED in state.plan.reason
+    assert any(update.NOT_REQUESTED in each for each in state_text.problems_of(obj))
+
+
+@pytest.mark.usefixtures("route")
+def test_a_character_appended_in_place_of_two_objects(tmp_path):
+    obj, armature = scenes.skinned_arm("dq")
+    expected = scenes.shapes(obj, [11])
+    path = str(tmp_path / "arm.blend")
+    bpy.ops.wm.save_as_mainfile(filepath=path)
+    obj_name, armature_name = obj.name, armature.name
+    bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+    others = [scenes.added("Empty", None) for _number in range(2)]
+    bpy.context.view_layer.update()
+    for other in others:
+        bpy.data.objects.remove(other)
+    appended = scenes.link_here(path, obj_name, armature_name, link=False)[0]
+    assert np.array_equal(scenes.shapes(appended, [11]), expected)
+
+
+@pytest.mark.usefixtures("route")
+def test_two_objects_swap_their_names():
+    obj, armature = scenes.make_arm()
+    other, other_armature = scenes.make_arm(name="Other")
+    bpy.data.objects.remove(other_armature)
+    other.modifiers["Armature"].object = armature
+    other.vertex_groups[1].add(list(range(80, 200)), 0.2, "REPLACE")
+    for each in (obj, other):
+        scenes.add_sinew(each, "dq")
+    expected = [scenes.shapes(each, [11]) for each in (obj, other)]
+    bpy.context.scene.frame_set(5)
+    obj.name, other.name, obj.name = "Third", "Arm", "Other"
+    seen = []
+    with scenes.handler(
+        "frame_change_post", lambda *_args: seen.append(scenes.final_points(obj)), first=True
+    ):
+        bpy.context.scene.frame_set(11)
+    for each, shape in zip((obj, other), expected, strict=True):
+        assert np.array_equal(scenes.final_points(each), shape[0])
+    assert safe_mode.is_on() or np.array_equal(seen[0], expected[0][0])
+
+
+def test_what_the_artist_switched_while_off_stays():
+    obj, _armature = scenes.skinned_arm()
+    properties.of(obj).enabled = False
+    obj.modifiers["Armature"].show_render = False
+    properties.of(obj).enabled = True
+    attach.remove(obj)
+    assert obj.modifiers["Armature"].show_viewport
+    assert not obj.modifiers["Armature"].show_render
+
+
+def test_a_driver_that_gives_no_method_is_said_so():
+    obj, _armature = scenes.skinned_arm("dq")
+    driver = obj.driver_add("sinew.method").driver
+    driver.type = "SUM"
+    variable = driver.variables.new()
+    variable.targets[0].id, variable.targets[0].data_path = obj, '["number"]'
+    for number, error in ((1, ""), (999, "the driver of its method")):
+        obj["number"] = number
+        scenes.rebind(obj)
+        bpy.context.scene.frame_set(11)
+        bpy.context.view_layer.update()
+        assert error in properties.of(obj).error
+    assert properties.of(obj).enabled
+    assert session.plan_of(obj).state is State.REFUSED
+
+
+def test_a_new_method_reads_only_changed_weights(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    characters.use_method(obj, "dq")
+    bpy.context.scene.frame_set(11)
+    reads, read = [], mesh_io.read_group_weights
+    monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: reads.append(mesh) or read(mesh))
+    bpy.context.view_layer.update()
+    reads.clear()
+    for method in ("lbs", "qv", "dq"):
+        characters.use_method(obj, method)
+        bpy.context.scene.frame_set(10)
+        bpy.context.scene.frame_set(11)
+    assert reads == []
+    before = scenes.final_points(obj)
+    obj.vertex_groups["bone.1"].remove(range(len(obj.data.vertices)))
+    obj.data.update()
+    characters.use_method(obj, "lbs")
+    assert len(reads) == 1
+    expected = scenes.rest_points(obj)
+    assert scenes.worst(before, expected) > 0.1
+    characters.use_method(obj, "blender")
+    expected = scenes.final_points(obj)
+    characters.use_method(obj, "lbs")
+    assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+def test_what_is_kept_of_many_modifiers_is_of_each():
+    """Blender moves all of them in memory when more are added."""
+    obj, armature = scenes.make_arm()
+    for number in range(20):
+        obj.modifiers.new(f"More {number}", "ARMATURE").object = armature
+    pairs = attach.replaced_modifiers(obj)
+    there = properties.of(obj).replaced_modifiers
+    assert [kept.as_pointer() for _modifier, kept in pairs] == [kept.as_pointer() for kept in there]
+    assert [kept.name for kept in there] == [modifier.name for modifier in obj.modifiers]
+
+
+@pytest.fixture
+def deformed(route) -> bpy.types.Object:
+    """An arm by dq at frame 6."""
+    obj, _armature = scenes.skinned_arm("dq")
+    bpy.context.scene.frame_set(6)
+    assert (session.plan_of(obj).state is State.AFTER_UPDATE) == (route == routes.UPDATE)
+    return obj
+
+
+@pytest.mark.parametrize("gone", ["applied", "deleted"])
+def test_another_armature_modifier_in_the_place_of_one_that_is_gone(deformed, gone):
+    armature = deformed.modifiers["Armature"].object
+    bpy.context.scene.frame_set(6)
+    bpy.context.view_layer.objects.active = deformed
+    act = bpy.ops.object.modifier_apply if gone == "applied" else bpy.ops.object.modifier_remove
+    act(modifier="Armature")
+    bpy.context.view_layer.update()
+    assert "deleted or applied; add another and press Rebind, or Remove" in session.plan_of(deformed).reason
+    assert not any(m.is_on for m in layout.read(deformed).modifiers)
+    another = deformed.modifiers.new("Another", "ARMATURE")
+    another.object, another.use_deform_preserve_volume = armature, True
+    bpy.context.scene.frame_set(8)
+    expected = scenes.final_points(deformed)
+    assert scenes.worst(expected, scenes.rest_points(deformed)) > 0.05
+    bpy.ops.sinew.rebind()
+    assert session.plan_of(deformed).state is not State.REFUSED
+    assert scenes.worst(scenes.final_points(deformed), expected) <= scenes.TOLERANCE * scenes.diagonal(
+        deformed
+    )
+    attach.remove(deformed)
+    assert [modifier.name for modifier in deformed.modifiers] == ["Another"]
+
+
+@pytest.mark.parametrize("keyed", ["viewport", "render"])
+def test_keys_of_one_visibility_leave_the_other(deformed, rendered_points, keyed):
+    modifier = deformed.modifiers["Armature"]
+    scenes.key(modifier, f"show_{keyed}", ((1, True), (5, False)))
+    for frame in (8, 3, 8, 3, 6):
+        bpy.context.scene.frame_set(frame)
+    shown, rendered = scenes.final_points(deformed), rendered_points(deformed)
+    attach.remove(deformed)
+    bpy.context.scene.frame_set(6)
+    assert (modifier.show_viewport, modifier.show_render) == (keyed == "render", keyed == "viewport")
+    modifier.use_deform_preserve_volume = True
+    near = scenes.TOLERANCE * scenes.diagonal(deformed)
+    assert scenes.worst(shown, scenes.final_points(deformed)) <= near
+    assert scenes.worst(rendered, rendered_points(deformed)) <= near
+    assert scenes.worst(shown, rendered) > 0.1
+
+
+def test_an_artists_driver_stays(deformed):
+    driver = deformed.driver_add("location", 0).driver
+    variable = driver.variables.new()
+    variable.name = "sinew_0"
+    variable.targets[0].id, variable.targets[0].data_path = deformed, "location[1]"
+    scenes.shapes(deformed, [1, 6, 11])
+    properties.of(deformed).heat = True
+    scenes.shapes(deformed, [1, 6, 11])
+    attach.remove(deformed)
+    assert [curve.data_path for curve in deformed.animation_data.drivers] == ["location"]
+
+
+@pytest.mark.by_sinew
+def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkeypatch):
+    obj, _armature = scenes.skinned_arm("dq")
+    bpy.context.scene.frame_set(6)
+
+    def fail(*_args: object) -> None:
+        raise RuntimeError("disk on fire")
+
+    monkeypatch.setattr(in_depsgraph, "_deform", fail)
+    got = scenes.shapes(obj, [2, 3, 4, 5])
+    state = session.state_of(obj)
+    assert state.evaluation.failures > 0
+    assert "disk on fire" in state.evaluation.failure
+    assert state.plan.state is State.AFTER_UPDATE
+    assert "disk on fire" in state.plan.reason
+    monkeypatch.undo()
+    attach.remove(obj)
+    expected = scenes.modifier_shapes(obj, [4, 5], preserve_volume=True)
+    assert scenes.worst(got[2:], expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.by_sinew
+def test_suspended_by_two_threads_at_once():
+    """As by a window and its render's thread: the second one waits, and at the end nothing is suspended."""
+    order, entered = [], threading.Event()
+
+    def other() -> None:
+        entered.set()
+        with updates_suspended():
+            order.append("other")
+
+    thread = threading.Thread(target=other)
+    with updates_suspended():
+        thread.start()
+        entered.wait(10)
+        thread.join(0.2)
+        with updates_suspended() as may_react:
+            assert not may_react
+        order.append("this")
+    thread.join(10)
+    assert order == ["this", "other"]
+    with updates_suspended() as may_react:
+        assert may_react
+
+
+def test_keys_that_two_objects_share_go_with_the_last(route):
+    obj, _armature = scenes.skinned_arm("dq")
+    obj.keyframe_insert("sinew.method", frame=4)
+    other = scenes.copied(obj, linked=True)
+    session.refresh(bpy.context)
+    assert other.animation_data.action == obj.animation_data.action
+    attach.remove(obj)
+    assert "sinew.method" in actions.animated_paths(other)
+    attach.remove(other)
+    bpy.context.scene.frame_set(5)
+    for each in (obj, other):
+        assert not actions.animated_paths(each)
+        assert not each.is_property_set("sinew")

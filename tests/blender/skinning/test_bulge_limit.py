@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The stage bulge_limit: its oracle is the float64 reference, from the shape before it and Blender's poses.
-Objects at other places, masks and shape keys are in test_fuzz.py."""
+Objects at other places, masks and shape keys are in the fuzzer."""
 
 from __future__ import annotations
 
