@@ -21,6 +21,7 @@ import bpy
 import pytest
 import scenes
 from conftest import REPOSITORY
+from program import ran
 
 INSTALL = """
 import json, sys
@@ -101,15 +102,9 @@ def test_installs_and_works_in_the_same_session(source, package, bare_site, tmp_
     scenes.save(tmp_path / "arm.blend")
     user = tmp_path / "user"
     points = tmp_path / "points.npy"
-    result = subprocess.run(
-        [sys.executable, "-S", "-c", INSTALL, bare_site, package, tmp_path / "arm.blend", points],
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-        env={k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
-        | {"BLENDER_USER_RESOURCES": str(user)},
-    )
+    words = sys.executable, "-S", "-c", INSTALL, bare_site, package, tmp_path / "arm.blend", points
+    env = {k: v for k, v in os.environ.items() if k != "PYTHONPATH"}
+    result = ran(*words, timeout=120, env=env | {"BLENDER_USER_RESOURCES": str(user)})
     assert result.returncode == 0, result.stdout + result.stderr
     # When it exits, Blender as a module unregisters it after everything else.
     assert "Traceback" not in result.stderr
@@ -183,9 +178,7 @@ def test_the_zip_has_nothing_that_reviewers_refuse(package):
 
 def run_split(package, out) -> subprocess.CompletedProcess[str]:
     program = REPOSITORY / "tools" / "split_package.py"
-    return subprocess.run(
-        [sys.executable, program, package, "--out", out], capture_output=True, text=True, check=False
-    )
+    return ran(sys.executable, program, package, "--out", out)
 
 
 def with_wheels_of(package: Path, tags: dict[str, str], target: Path) -> Path:
@@ -303,9 +296,7 @@ sys.exit(cli.main(["methods"]))
 )
 @pytest.mark.once
 def test_an_older_library_is_named_in_one_sentence(change, sentence):
-    result = subprocess.run(
-        [sys.executable, "-c", OLDER_LIBRARY, change], capture_output=True, text=True, timeout=120
-    )
+    result = ran(sys.executable, "-c", OLDER_LIBRARY, change)
     assert result.returncode == 1, result.stdout + result.stderr
     assert "Traceback" not in result.stderr
     assert re.search(sentence, result.stderr)

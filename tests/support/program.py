@@ -36,17 +36,11 @@ def run_script(path: Path, text: str) -> subprocess.CompletedProcess:
     """Runs a script in a Python of its own, which may import from this folder. It must come to its end, and
     exit with status 0."""
     path.write_text(f"{text}\nprint('at its end')\n")
-    ran = subprocess.run(
-        [sys.executable, "-X", "faulthandler", path],
-        env={**os.environ, "PYTHONPATH": str(Path(__file__).parent)},
-        capture_output=True,
-        text=True,
-        timeout=120,
-        check=False,
-    )
-    assert "at its end" in ran.stdout, ran.stdout[-2000:] + ran.stderr[-3000:]
-    assert ran.returncode == 0, ran.stderr
-    return ran
+    env = {**os.environ, "PYTHONPATH": str(Path(__file__).parent)}
+    done = ran(sys.executable, "-X", "faulthandler", path, env=env, timeout=120)
+    assert "at its end" in done.stdout, done.stdout[-2000:] + done.stderr[-3000:]
+    assert done.returncode == 0, done.stderr
+    return done
 
 
 # Runs one script after the other, each with its words in sys.argv. What they print goes to two files, as
@@ -149,16 +143,13 @@ def run_program(
     *args: object, status: int = 0, env_more: dict[str, str] | None = None, within: Sequence[str] = ()
 ) -> subprocess.CompletedProcess:
     """In a process of its own, as users run it. within: words before the program's own command"""
-    result = subprocess.run(
-        [*within, *COMMAND, *map(str, args)],
-        capture_output=True,
-        text=True,
-        encoding="utf-8",
-        timeout=300,
-        check=False,
-        env={**ENVIRONMENT, **(env_more or {})},
-    )
-    return checked(result, status)
+    return checked(ran(*within, *COMMAND, *args, env=ENVIRONMENT | (env_more or {})), status)
+
+
+def ran(*words: object, **options: object) -> subprocess.CompletedProcess:
+    """Any program, with what it prints. options  of subprocess.run()"""
+    options = {"timeout": 300, "encoding": "utf-8", **options}
+    return subprocess.run(list(map(str, words)), capture_output=True, check=False, **options)
 
 
 def checked(result: subprocess.CompletedProcess, status: int) -> subprocess.CompletedProcess:

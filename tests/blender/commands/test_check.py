@@ -6,14 +6,13 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import bpy
 import pytest
 import scenes
 from conftest import IS_NEWEST
-from program import run_sinew
+from program import ran, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.commands.check import line_of
 
@@ -174,19 +173,11 @@ def test_a_whole_blender(skinned, plain, tmp_path):
         f'#!/bin/sh\ncd {tmp_path}\nBLENDER_USER_RESOURCES={user} exec {program} run "$@"\n',
     )
     shutil.copy(package, tmp_path / "sinew.zip")
-    subprocess.run(
-        [other, "--command", "extension", "install-file", "-r", "user_default", "-e", tmp_path / "sinew.zip"],
-        check=True,
-        capture_output=True,
-    )
+    install = "--command", "extension", "install-file", "-r", "user_default", "-e"
+    assert ran(other, *install, tmp_path / "sinew.zip").returncode == 0
     plain.with_name("broken.blend").write_bytes(b"BLENDER and then nothing")
     names = ("skinned.blend", "plain.blend", "broken.blend")
-    done = subprocess.run(
-        [other, "--command", "sinew", "check", *(tmp_path / name for name in names)],
-        capture_output=True,
-        text=True,
-        check=False,
-    )
+    done = ran(other, "--command", "sinew", "check", *(tmp_path / name for name in names))
     assert done.returncode == 1, done.stdout + done.stderr
     said = dict(zip(names, done.stdout.splitlines()[-3:], strict=True))
     assert "ok: Sinew deforms 1 mesh by dq" in said["skinned.blend"]

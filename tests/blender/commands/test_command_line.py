@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 
 import bpy
@@ -66,7 +65,7 @@ from sinew_addon.cli import run
 run()
 """
     command = [sys.executable, "-c", code, "info", arm_file[0]]
-    done = subprocess.run(command, env=program.ENVIRONMENT, capture_output=True, text=True, check=False)
+    done = program.ran(*command, env=program.ENVIRONMENT)
     assert (done.returncode, done.stderr) == (130, "sinew: stopped\n")
     assert not done.stdout
 

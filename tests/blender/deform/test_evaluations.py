@@ -79,6 +79,15 @@ SETUPS = {
     "moving mesh": lambda obj, armature: move(obj),
     "moving keys": lambda obj, armature: scenes.key_shape(obj),
 }
+
+
+def skinned(set_up: str) -> tuple[bpy.types.Object, bpy.types.Object]:
+    obj, armature = scenes.make_arm()
+    SETUPS[set_up](obj, armature)
+    scenes.add_sinew(obj)
+    return obj, armature
+
+
 with_few = pytest.mark.parametrize("set_up", ["still", "modifier in front", "shared mesh"])
 
 
@@ -103,9 +112,7 @@ def test_a_frame_evaluates_the_mesh_once(set_up):
 @pytest.mark.usefixtures("counting")
 @with_few
 def test_posing_evaluates_the_mesh_once(set_up):
-    obj, armature = scenes.make_arm()
-    SETUPS[set_up](obj, armature)
-    scenes.add_sinew(obj)
+    obj, armature = skinned(set_up)
     bpy.context.scene.frame_set(2)
     assert [evaluations_in(lambda: pose(armature), obj.name) for _ in range(3)] == [1, 1, 1]
 
@@ -125,9 +132,7 @@ def test_a_frame_computes_the_shape_once(monkeypatch):
 @with_few
 @pytest.mark.parametrize("modifier", ["Sinew", "Armature"])
 def test_a_click_on_an_icon_evaluates_the_mesh_as_often_as_blender(set_up, modifier):
-    obj, armature = scenes.make_arm()
-    SETUPS[set_up](obj, armature)
-    scenes.add_sinew(obj)
+    obj, _armature = skinned(set_up)
     bpy.context.scene.frame_set(2)
 
     def click() -> None:
@@ -162,9 +167,7 @@ def modules_passed(action: Callable[[], object]) -> dict[str, set[str]]:
 
 @with_few
 def test_a_frame_passes_few_modules_after_the_evaluation(set_up):
-    obj, armature = scenes.make_arm()
-    SETUPS[set_up](obj, armature)
-    scenes.add_sinew(obj)
+    obj, armature = skinned(set_up)
     for frame in (1, 2, 3):
         bpy.context.scene.frame_set(frame)
     pose(armature)

@@ -112,6 +112,14 @@ def shape_by_cor() -> np.ndarray:
     return found
 
 
+def arm_by_cor() -> bpy.types.Object:
+    """Added at a frame at which it is bent."""
+    obj, _armature = scenes.make_arm(bones=3)
+    bpy.context.scene.frame_set(FRAME)
+    scenes.add_sinew(obj, "cor")
+    return obj
+
+
 def plan_of(obj: bpy.types.Object):
     return session.state_of(obj).plan
 
@@ -198,9 +206,7 @@ def test_a_render_waits(gate, route, rendered_points):
     expected = shape_by_cor()
     precomputations.waits = False
     gate.close()
-    obj, _armature = scenes.make_arm(bones=3)
-    bpy.context.scene.frame_set(FRAME)
-    scenes.add_sinew(obj, "cor")
+    obj = arm_by_cor()
     assert plan_of(obj).state is State.WAITING
     threading.Timer(0.2, gate.open).start()
     points = rendered_points(obj)
@@ -238,9 +244,7 @@ def move_weights(obj: bpy.types.Object) -> None:
 
 
 def test_while_weights_are_painted_the_old_centres_serve(gate, route):
-    obj, _armature = scenes.make_arm(bones=3)
-    bpy.context.scene.frame_set(FRAME)
-    scenes.add_sinew(obj, "cor")
+    obj = arm_by_cor()
     assert gate.count == 1
     precomputations.waits = False
     for _ in range(3):
@@ -334,9 +338,7 @@ def test_a_keyed_method_is_asked_for_when_it_comes(gate, route):
 
 def test_an_object_that_is_off_has_nothing_to_wait_for(gate):
     """Its triangles are not read, so its centres can not be recomputed."""
-    obj, _armature = scenes.make_arm(bones=3)
-    bpy.context.scene.frame_set(FRAME)
-    scenes.add_sinew(obj, "cor")
+    obj = arm_by_cor()
     obj.sinew.method = "qv"
     move_weights(obj)
     obj.sinew.enabled = False

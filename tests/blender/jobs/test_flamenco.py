@@ -11,7 +11,7 @@ from pathlib import Path
 import bpy
 import pytest
 import sinew
-from program import COMMAND, ENVIRONMENT
+from program import COMMAND, ENVIRONMENT, ran
 from sinew_addon.attach import properties
 from sinew_addon.io import files
 from test_batch import make_rig
@@ -29,13 +29,8 @@ MANAGER = Path(__file__).with_name("flamenco_manager.js")
 
 
 def compile_job(**settings: object) -> dict:
-    done = subprocess.run(
-        ["node", MANAGER, SCRIPT],
-        input=json.dumps({"settings": settings}),
-        capture_output=True,
-        text=True,
-        check=True,
-    )
+    done = ran("node", MANAGER, SCRIPT, input=json.dumps({"settings": settings}))
+    assert done.returncode == 0, done.stderr
     return json.loads(done.stdout)
 
 
@@ -65,9 +60,7 @@ def run_task(task: dict, variables: dict[str, list[str]]) -> subprocess.Complete
         words: list[str] = []
         for word in (parameters["exe"], *parameters["args"]):
             words += variables.get(word, [word])
-        done = subprocess.run(
-            words, capture_output=True, text=True, timeout=300, check=False, env=ENVIRONMENT
-        )
+        done = ran(*words, env=ENVIRONMENT)
         if done.returncode:
             break
     assert done is not None

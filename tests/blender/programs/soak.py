@@ -13,7 +13,6 @@ a frame. Exit status 1 if one of them keeps growing.
 from __future__ import annotations
 
 import argparse
-import ctypes
 import statistics
 import sys
 import time
@@ -31,6 +30,7 @@ from sinew_addon.features.compare import comparison
 sys.path.append(str(Path(__file__).resolve().parents[2] / "support"))
 import routes
 import scenes
+from python_threads import in_foreign_threads, thread_states
 
 LENGTH = 24
 SAMPLES = 20
@@ -53,19 +53,6 @@ class Sample:
     data: int
     states: int
     milliseconds: float
-
-
-def thread_states() -> int:
-    """How many thread states Python keeps, for live and dead threads."""
-    api = ctypes.pythonapi
-    for name in ("PyInterpreterState_Main", "PyInterpreterState_ThreadHead", "PyThreadState_Next"):
-        getattr(api, name).restype = ctypes.c_void_p
-    state = api.PyInterpreterState_ThreadHead(ctypes.c_void_p(api.PyInterpreterState_Main()))
-    count = 0
-    while state:
-        count += 1
-        state = api.PyThreadState_Next(ctypes.c_void_p(state))
-    return count
 
 
 def handler_count() -> int:
@@ -153,12 +140,10 @@ HEADING = f"{'frames':>8} {'MiB':>9} {'handlers':>9} {'data':>7} {'states':>7} {
 def run_in_threads(count: int) -> int:
     """Evaluates the scene in `count` threads that Python did not start, one after the other. Returns how
     many more thread states Python keeps than before."""
-    library = ctypes.CDLL(None)
-    kind = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
     rigs = [obj for obj in bpy.data.objects if obj.type == "ARMATURE"]
     failures: list[str] = []
 
-    def evaluate(_argument: int | None) -> None:
+    def evaluate() -> None:
         try:
             for rig in rigs:
                 bone = rig.pose.bones[-1]
@@ -167,13 +152,8 @@ def run_in_threads(count: int) -> int:
         except Exception as error:
             failures.append(repr(error))
 
-    callback = kind(evaluate)
     before = thread_states()
-    for _number in range(count):
-        thread = ctypes.c_ulong()
-        if library.pthread_create(ctypes.byref(thread), None, callback, None):
-            raise OSError("no thread could be started")
-        library.pthread_join(thread, None)
+    in_foreign_threads(evaluate, count)
     if failures:
         raise RuntimeError(f"{len(failures)} threads failed: {failures[0]}")
     return thread_states() - before

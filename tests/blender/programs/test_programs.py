@@ -6,7 +6,6 @@ from __future__ import annotations
 
 import json
 import os
-import subprocess
 import sys
 
 import bpy
@@ -20,6 +19,7 @@ import scenes
 import soak
 import walk
 from conftest import IS_NEWEST
+from program import ran
 
 # The newest Blender runs the first 100 rigs, each other one 40 different ones: all of them must have the same
 # shapes (docs/parity.md), and together they check more rigs.
@@ -84,8 +84,7 @@ def test_each_file_is_a_row(tmp_path):
     bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
     bpy.ops.mesh.primitive_cube_add()
     scenes.save(below / "cube.blend")
-    words = [sys.executable, corpus.__file__, str(below.parent), "--json", str(tmp_path / "rows.json")]
-    done = subprocess.run(words, capture_output=True, text=True, timeout=300, check=False)
+    done = ran(sys.executable, corpus.__file__, below.parent, "--json", tmp_path / "rows.json")
     assert done.returncode == 0, done.stdout + done.stderr
     arm, broken, cube = json.loads((tmp_path / "rows.json").read_text())
     assert arm["by"] == ["evaluation"]

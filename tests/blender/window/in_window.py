@@ -6,12 +6,12 @@ from __future__ import annotations
 import json
 import os
 import shutil
-import subprocess
 from pathlib import Path
 
 import bpy
 import pytest
 from conftest import IS_NEWEST, REPOSITORY
+from program import ran
 
 HERE = Path(__file__).parent
 
@@ -37,15 +37,9 @@ def facts_of(script: str, folder: Path, *others: str) -> dict:
     for name in ("window_scene", *others, script):
         shutil.copy(HERE / f"{name}.py", folder)
     options = ("--factory-startup", "--enable-event-simulate", "--python-exit-code", "3", "--python")
-    run = subprocess.run(
-        [program, "run", *options, f"{script}.py", "--", "sinew.zip", "."],
-        cwd=folder,
-        capture_output=True,
-        text=True,
-        timeout=900,
-        check=False,
-        env={**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"},
-    )
+    words = program, "run", *options, f"{script}.py", "--", "sinew.zip", "."
+    env = {**os.environ, "BLENDER_USER_RESOURCES": str(folder / "user"), "SCREEN": "1280x800"}
+    run = ran(*words, cwd=folder, timeout=900, env=env)
     output = run.stdout + run.stderr
     lines = [line for line in run.stdout.splitlines() if line.startswith("FACTS ")]
     assert run.returncode == 0, run.stdout[-3000:] + run.stderr[-3000:]

@@ -17,6 +17,7 @@ from pathlib import Path
 import in_window
 import pytest
 from conftest import REPOSITORY
+from program import ran
 
 pytestmark = pytest.mark.window
 
@@ -104,13 +105,7 @@ def _run(program: str, folder: Path, groups: tuple[str, ...], found: Results) ->
             found.ended[group] = f"exit status {status} in {step}:\n{text[-2000:]}"
     manifest = folder / "out" / f"saved-{groups[-1]}.json"
     if manifest.exists():
-        read = subprocess.run(
-            [sys.executable, Path(__file__).with_name("window_read.py"), manifest],
-            capture_output=True,
-            text=True,
-            timeout=200,
-            check=False,
-        )
+        read = ran(sys.executable, Path(__file__).with_name("window_read.py"), manifest)
         lines = [line for line in read.stdout.splitlines() if line.startswith("FAULTS ")]
         assert lines, read.stdout + read.stderr
         found.saved |= json.loads(lines[0][7:])

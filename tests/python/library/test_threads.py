@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import ctypes
 import os
 import signal
 import sys
@@ -12,45 +11,16 @@ import time
 
 import pytest
 import sinew
+from python_threads import in_foreign_threads, thread_states
 
 THREADS = 50
 
 
-def thread_states() -> int:
-    """The number of thread states that Python has."""
-    api = ctypes.pythonapi
-    for name in ("PyInterpreterState_Get", "PyInterpreterState_ThreadHead", "PyThreadState_Next"):
-        getattr(api, name).restype = ctypes.c_void_p
-    state = api.PyInterpreterState_ThreadHead(ctypes.c_void_p(api.PyInterpreterState_Get()))
-    count = 0
-    while state:
-        count += 1
-        state = api.PyThreadState_Next(ctypes.c_void_p(state))
-    return count
+needs_posix = pytest.mark.skipif(sys.platform == "win32", reason="no POSIX threads here")
 
 
-@pytest.fixture
-def in_foreign_threads():
-    """in_foreign_threads(work, count): runs work in this many threads of the system, one after the other."""
-    if sys.platform == "win32":
-        pytest.skip("no POSIX threads here")
-    library = ctypes.CDLL(None)
-    entry = ctypes.CFUNCTYPE(ctypes.c_void_p, ctypes.c_void_p)
-
-    def run(work, count):
-        @entry
-        def start(_argument):
-            work()
-
-        for _ in range(count):
-            thread = ctypes.c_ulong()
-            assert library.pthread_create(ctypes.byref(thread), None, start, None) == 0
-            assert library.pthread_join(thread, None) == 0
-
-    return run
-
-
-def test_a_kept_state_goes_with_its_thread(in_foreign_threads):
+@needs_posix
+def test_a_kept_state_goes_with_its_thread():
     met = []
 
     def work():
@@ -74,7 +44,8 @@ def test_threads_of_python_keep_their_own():
     assert thread_states() == before
 
 
-def test_each_thread_has_its_number(in_foreign_threads):
+@needs_posix
+def test_each_thread_has_its_number():
     met = []
     in_foreign_threads(lambda: met.append(sinew.thread_id() == sinew.thread_id()), 3)
     thread = threading.Thread(target=lambda: met.append(sinew.thread_id()))

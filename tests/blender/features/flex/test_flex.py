@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import subprocess
 import sys
 from pathlib import Path
 from xml.etree import ElementTree
@@ -16,7 +15,7 @@ import pytest
 import read_page
 import scenes
 from planted import HUMAN, PLANTS, Plant, Rig
-from program import run_sinew
+from program import ran, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.base.steps import result_of
 from sinew_addon.features.flex import flex
@@ -197,14 +196,8 @@ def test_wrong(sinew_flex):
     sinew_flex({str(good)!r}, options=["--methods", "mush"])
 """
     )
-    done = subprocess.run(
-        [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rfp", "test_characters.py"],
-        cwd=tmp_path,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=300,
-    )
+    words = "-m", "pytest", "-q", "-p", "no:cacheprovider", "-rfp", "test_characters.py"
+    done = ran(sys.executable, *words, cwd=tmp_path)
     assert "3 failed, 2 passed" in done.stdout, done.stdout + done.stderr
     for name, said in (("bad", "Radius: "), ("absent", "no such file"), ("wrong", "expected one of")):
         assert f"test_{name}" in done.stdout

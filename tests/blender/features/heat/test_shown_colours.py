@@ -51,6 +51,11 @@ def baked_arm() -> bpy.types.Object:
     return obj
 
 
+@pytest.fixture(params=["heat", "error"])
+def what(request) -> str:
+    return request.param
+
+
 def shown_arm(what: str) -> bpy.types.Object:
     """An arm that can show a measure of the deformation, or the error of a bake."""
     obj = baked_arm() if what == "error" else painted_arm("Heated")
@@ -67,7 +72,6 @@ def show(what: str) -> None:
     assert bpy.ops.sinew.heat_map(quantity="bake_error" if what == "error" else "stretch") == {"FINISHED"}
 
 
-@pytest.mark.parametrize("what", ["heat", "error"])
 def test_all_is_restored(what):
     obj = shown_arm(what)
     measures.of(bpy.context.scene).quantity = "bake_error" if what == "error" else "stretch"
@@ -104,7 +108,6 @@ def test_a_baked_mesh_that_sinew_deforms_again_shows_its_errors():
     assert np.argmax(errors) == np.argmax(colours[:, 0] + colours[:, 1])
 
 
-@pytest.mark.parametrize("what", ["heat", "error"])
 def test_what_the_artist_chooses_meanwhile_stays(what):
     obj = shown_arm(what)
     show(what)
@@ -126,7 +129,6 @@ def test_another_bake_hides_the_errors_of_the_last_one():
     assert [mesh.name for mesh in bpy.data.meshes if NAME in mesh.attributes] == []
 
 
-@pytest.mark.parametrize("what", ["heat", "error"])
 def test_undo_and_redo(what):
     obj = shown_arm(what)
     types, name = color_types(), obj.name
@@ -146,7 +148,6 @@ def test_undo_and_redo(what):
     assert_restored(obj, types)
 
 
-@pytest.mark.parametrize("what", ["heat", "error"])
 def test_a_saved_file_shows_it_and_gives_all_back(what, tmp_path):
     obj = shown_arm(what)
     types, name, path = color_types(), obj.name, str(tmp_path / "shown.blend")
@@ -162,7 +163,6 @@ def test_a_saved_file_shows_it_and_gives_all_back(what, tmp_path):
     assert_restored(obj, types)
 
 
-@pytest.mark.parametrize("what", ["heat", "error"])
 def test_a_deleted_mesh_gives_the_views_back(what):
     obj = shown_arm(what)
     types = color_types()
@@ -172,7 +172,6 @@ def test_a_deleted_mesh_gives_the_views_back(what):
     assert color_types() == types
 
 
-@pytest.mark.parametrize("what", ["heat", "error"])
 def test_without_the_add_on_all_is_as_before(what):
     obj = shown_arm(what)
     types = color_types()

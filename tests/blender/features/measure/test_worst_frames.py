@@ -29,14 +29,19 @@ def waving_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
     return obj, armature
 
 
+def skinned_arm() -> tuple[bpy.types.Object, bpy.types.Object]:
+    obj, armature = waving_arm()
+    scenes.add_sinew(obj, "dq")
+    return obj, armature
+
+
 def scan() -> worst_frames.Scan:
     return worst_frames.scans[bpy.context.scene.session_uid]
 
 
 @pytest.mark.parametrize("quantity", ["stretch", "area", "bulge", "distance"])
 def test_finds_the_peaks_worst_first(quantity):
-    obj, _armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = skinned_arm()
     measures.of(bpy.context.scene).quantity = quantity
     assert bpy.ops.sinew.worst_frames() == {"FINISHED"}
     worst = scan().worst()
@@ -60,8 +65,7 @@ def test_ranges_are_the_scenes_the_previews_or_the_actions():
 
 
 def test_a_range_fitted_to_frames_holds_all_their_values():
-    obj, _armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = skinned_arm()
     scene = bpy.context.scene
     settings = measures.of(scene)
     settings.quantity = "bulge"
@@ -81,8 +85,7 @@ def test_a_range_fitted_to_frames_holds_all_their_values():
 
 
 def test_what_can_not_be_measured_is_said():
-    obj, armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, armature = skinned_arm()
     armature.animation_data_clear()
     with pytest.raises(RuntimeError, match="no action; choose one"):
         bpy.ops.sinew.worst_frames(over="ACTION")
@@ -100,8 +103,7 @@ def test_peaks():
 
 
 def test_numbers_of_the_other_method_are_its_own():
-    obj, _armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = skinned_arm()
     scene = bpy.context.scene
     scene.unit_settings.system = "METRIC"
     scene.frame_set(15)
@@ -121,8 +123,7 @@ def test_numbers_of_the_other_method_are_its_own():
 
 def test_measuring_twice_measures_once():
     """The panel draws often, but computes a frame once."""
-    obj, _armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = skinned_arm()
     first = scenes.measure(obj, "lbs").measured
     assert scenes.measure(obj, "lbs").measured is first
     subject = scenes.measure(obj, "lbs")
@@ -138,8 +139,7 @@ def test_measuring_twice_measures_once():
 
 
 def test_topology_edited_is_measured_anew():
-    obj, _armature = waving_arm()
-    scenes.add_sinew(obj, "dq")
+    obj, _armature = skinned_arm()
     before = scenes.measure(obj, "lbs").gauge.surface
     bpy.ops.object.mode_set(mode="EDIT")
     bpy.ops.mesh.select_all(action="SELECT")

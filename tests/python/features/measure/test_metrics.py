@@ -3,7 +3,6 @@
 
 import json
 import re
-import subprocess
 import sys
 from pathlib import Path
 
@@ -12,6 +11,7 @@ import pytest
 import rigs
 import trimesh
 from closed_tube import IDENTITY, LENGTH, RADIUS, RINGS, SIDES, Tube, influences_of
+from program import ran
 from rigs import about, random_motion, transform
 from sinew_addon.features.flex.limits import LIMITS
 from sinew_addon.features.measure.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape
@@ -307,15 +307,8 @@ def test_the_documented_code_runs_without_blender():
     blocks = re.findall(
         r"```python\n(.*?)```", (root / "docs" / "metrics.md").read_text(encoding="utf-8"), re.S
     )
-    done = subprocess.run(
-        [sys.executable, "-c", DOCUMENTED],
-        input="\n".join(blocks),
-        cwd=Path(rigs.__file__).parent,
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=60,
-    )
+    words = sys.executable, "-c", DOCUMENTED
+    done = ran(*words, input="\n".join(blocks), cwd=Path(rigs.__file__).parent)
     assert done.returncode == 0, done.stderr
     volume_change, bulge, distance, worst = json.loads(done.stdout)
     assert volume_change == pytest.approx(-2 / 3, abs=1e-5)
