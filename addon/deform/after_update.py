@@ -11,6 +11,7 @@ import numpy as np
 
 from ..attach import layout, point_store, properties
 from ..base.errors import SinewError
+from ..skinning.skin_stack import NO_STAGES
 from . import bound, pose, source
 from .changes import Changes
 from .skinned_object import SkinnedObject
@@ -65,7 +66,9 @@ def shape(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.De
     icons = pose.icons_of(evaluated, modifiers, skinned)
     frames = pose.read(evaluated, settings, modifiers, skinned, icons, depsgraph.mode)
     rest_points = source.rest_points(obj, skinned.bound.source, depsgraph)
-    values = pose.stage_values(settings)
+    # In a view in which nothing deforms, Sinew's modifier shows what it gets.
+    is_deformed = any(icons[depsgraph.mode == "RENDER"].modifiers)
+    values = pose.stage_values(settings) if is_deformed else NO_STAGES
     differs = skinned.bound.skin_stack.deform(rest_points, frames, values=values)
     number = skinned.shown.number + differs
     skinned.shown = replace(

@@ -272,3 +272,17 @@ def test_sinews_icon_for_edit_mode_goes_off_again():
         rule.click(modifier, "render")
         character.check(rule)
         assert not own.show_in_editmode
+
+
+def test_stages_change_nothing_where_nothing_deforms(route):
+    """Delta Mush would smooth what a shape key makes."""
+    obj, _armature = scenes.make_arm()
+    scenes.key_shape(obj, (1.0, 1.0, 1.5))
+    bpy.context.scene.frame_set(9)
+    obj.modifiers["Armature"].show_viewport = False
+    expected = scenes.final_points(obj)
+    scenes.add_sinew(obj, "dq")
+    properties.of(obj).delta_mush.enabled = True
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
+    obj.modifiers["Armature"].show_viewport = True
+    assert scenes.worst(scenes.final_points(obj), expected) > 1e-3
