@@ -138,7 +138,9 @@ def _leave_out(
     # Of a copy that is marked, the address is known.
     if stack_now[known.sinew].show_in_editmode and skinned.evaluation.left_out.get(copy) == left_out:
         return
-    if any(".show_" in path for path in animated_paths(evaluated)):
+    names = map(bpy.utils.escape_identifier, (*known.own, *known.replaced))
+    starts = tuple(f'modifiers["{name}"].show_' for name in names)
+    if any(path.startswith(starts) for path in animated_paths(evaluated)):
         # An animation that was just added decides from now on.
         return
     if len(skinned.evaluation.left_out) > _MAX_COPIES:

@@ -286,3 +286,18 @@ def test_stages_change_nothing_where_nothing_deforms(route):
     assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
     obj.modifiers["Armature"].show_viewport = True
     assert scenes.worst(scenes.final_points(obj), expected) > 1e-3
+
+
+@pytest.mark.usefixtures("route")
+@pytest.mark.parametrize("view", VIEWS)
+def test_keys_on_the_icon_of_a_modifier_behind(view, rendered_points):
+    """They are no reason to deform where the Armature modifier is off."""
+    character = Character(lambda obj: obj.modifiers.new("Behind", "MIRROR"))
+    obj, other = character.obj, VIEWS[view == "viewport"]
+    scenes.key(obj.modifiers["Behind"], "show_viewport", ((1, True), (10, True)))
+    character.click("Armature", view)
+    bpy.context.scene.frame_set(9)
+    points = {"viewport": scenes.final_points(obj), "render": rendered_points(obj)}
+    for each, expected in ((view, NOTHING), (other, SINEW)):
+        assert points[each].shape == character.shapes[expected].shape
+        assert scenes.worst(points[each], character.shapes[expected]) <= 1e-5
