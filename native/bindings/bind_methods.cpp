@@ -131,8 +131,7 @@ are computed; "precomputation", a function that computes them.)")
         "All skinning methods.");
     m.def(
         "stages", []() -> Typed<"tuple[sinew._native.Stage, ...]"> { return tuple_of<StageInfo>(kStages); },
-        "All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is "
-        "BulgeLimit, `delta_mush` is DeltaMush.");
+        "All stages. `mix` is an argument of Deformer, each other a class: `bulge_limit` is BulgeLimit.");
 }
 
 }  // namespace sinew::bindings

@@ -12,9 +12,7 @@
 #include "sinew/base/simd.h"
 #include "sinew/base/status.h"
 #include "sinew/base/thread_pool.h"
-#include "sinew/bulge_limit.h"
 #include "sinew/deformer.h"
-#include "sinew/delta_mush.h"
 #include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/interpolate/spline.h"
@@ -29,7 +27,6 @@
 #include "sinew/transform/make.h"
 #include "sinew/transform/rigid_distance.h"
 #include "sinew/transform/screw.h"
-#include "sinew/twist_spread.h"
 #if SINEW_WITH_DDM
 #include "sinew/methods/ddm/direct_delta_mush.h"
 #endif

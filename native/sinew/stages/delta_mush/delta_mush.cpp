@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/delta_mush.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,6 @@
 #include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
 #include "sinew/mesh/check_arrays.h"
-#include "sinew/stages/delta_mush/delta_mush.h"
 #include "sinew/stages/delta_mush/mush_mesh.h"
 
 namespace sinew {
