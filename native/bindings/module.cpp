@@ -28,4 +28,11 @@ PYBIND11_MODULE(_native, m) {
     SINEW_BINDINGS(SINEW_BIND)
 #define SINEW_BIND_STAGE(Stage) sinew::bindings::bind_stage(m, sinew::Stage{});
     SINEW_STAGES(SINEW_BIND_STAGE)
+    // What `sinew` takes from here by a star: its own modules go before those of the same names.
+    pybind11::list names;
+    for (const auto& [name, value] : m.attr("__dict__").cast<pybind11::dict>()) {
+        const bool is_private = pybind11::str(name).attr("startswith")("_").cast<bool>();
+        if (!is_private && !pybind11::isinstance<pybind11::module_>(value)) names.append(name);
+    }
+    m.attr("__all__") = names;
 }

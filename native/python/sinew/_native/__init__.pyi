@@ -12,7 +12,7 @@ from . import dual
 from . import quat
 from . import interpolate
 from . import spline
-__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id', 'weights_in_memory']
+__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'centres_of_rotation', 'direct_delta_mush', 'keep_thread_state', 'methods', 'stages', 'thread_id', 'weights_in_memory']
 class Parameter:
     """A setting of a method or of a stage."""
     def __repr__(self) -> str: ...
