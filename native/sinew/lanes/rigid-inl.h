@@ -90,9 +90,9 @@ HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> 
     for (std::size_t i = 0; i < Rigid::kNumbers; ++i) {
         const Vec<D> difference = hn::Set(d, row[i] - base[i]);
         const Vec<D> negated = hn::Set(d, -row[i] - base[i]);
-        const Vec<D> by =
+        const Vec<D> term =
             i < 4 * Rigid::kSignedFloat4s ? hn::IfThenElse(away, negated, difference) : difference;
-        blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
+        blend.sum.value[i] = hn::MulAdd(weight, term, blend.sum.value[i]);
     }
     for (std::size_t i = 0; i < 4; ++i)
         quaternion[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), quaternion[i]);
@@ -513,9 +513,9 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
             away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
         }
         for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
-            V4 by = hn::Load(d, row[q].value.data());
-            if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
-            sum[q] = hn::MulAdd(weight, hn::Sub(by, hn::Load(d, base + 4 * q)), sum[q]);
+            V4 term = hn::Load(d, row[q].value.data());
+            if (q < Rigid::kSignedFloat4s) term = hn::Xor(term, away);
+            sum[q] = hn::MulAdd(weight, hn::Sub(term, hn::Load(d, base + 4 * q)), sum[q]);
         }
         quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
     }

@@ -148,8 +148,8 @@ struct MomentRows {
 
 HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::size_t lane) {
     const auto& first_rows = moments.blocks[b].first_rows;
-    const auto part = [&](MomentPart of) {
-        const auto i = static_cast<std::size_t>(of);
+    const auto part = [&](MomentPart which) {
+        const auto i = static_cast<std::size_t>(which);
         return moments.parts[i].data()[first_rows[i]].lane.data() + lane;
     };
     return {part(MomentPart::first_weight), part(MomentPart::weight), part(MomentPart::first),
@@ -213,8 +213,8 @@ HWY_INLINE void add_moved(D d, const float* row, const Points<D>* p, const Vec<D
 /// Adds a quaternion in the hemisphere of the sum before it.
 template <class D>
 HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
-    const Vec<D> by = hn::IfThenElse(hn::Lt(dot(d, q, sum), hn::Zero(d)), hn::Neg(weight), weight);
-    for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
+    const Vec<D> signed_weight = hn::IfThenElse(hn::Lt(dot(d, q, sum), hn::Zero(d)), hn::Neg(weight), weight);
+    for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(signed_weight, hn::Set(d, q[i]), sum[i]);
 }
 
 /// Blends the bones of kVectors neighbouring vectors by the moments: the quaternion, and the displacement of the
@@ -343,10 +343,11 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
                         : Points<D>{zero, zero, zero};
         add_moved<1>(d, row, &centroid, &one, &moved);
         const Vec<D> weight = load_weight(d, rows, k);
-        const Points<D> by = add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
-        sum.x = add_scaled<D>(sum.x, moved.x, by);
-        sum.y = add_scaled<D>(sum.y, moved.y, by);
-        sum.z = add_scaled<D>(sum.z, moved.z, by);
+        const Points<D> about_centroid =
+            add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
+        sum.x = add_scaled<D>(sum.x, moved.x, about_centroid);
+        sum.y = add_scaled<D>(sum.y, moved.y, about_centroid);
+        sum.z = add_scaled<D>(sum.z, moved.z, about_centroid);
     }
     return sum;
 }
@@ -375,8 +376,8 @@ HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
     const Vec<D> zz = hn::Mul(z, q[3]);
     // Row i of the result is the rows of m weighted by column i of the rotation. The identity is added
     // separately.
-    const auto combined = [&](const Points<D>& own, Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
-        return add_scaled<D>(add_scaled<D>(add_scaled<D>(own, a, m.x), b, m.y), c, m.z);
+    const auto combined = [&](const Points<D>& row, Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+        return add_scaled<D>(add_scaled<D>(add_scaled<D>(row, a, m.x), b, m.y), c, m.z);
     };
     return {combined(m.x, hn::Neg(hn::Add(yy, zz)), hn::Add(xy, wz), hn::Sub(xz, wy)),
             combined(m.y, hn::Sub(xy, wz), hn::Neg(hn::Add(xx, zz)), hn::Add(yz, wx)),
@@ -414,9 +415,9 @@ HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
                                      hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
     const Vec<D> scale = hn::IfThenElseZero(
         has_maximum, hn::Div(hn::Set(d, 0.5f), hn::IfThenElse(has_maximum, determinant, hn::Set(d, 1.0f))));
-    const auto solved = [&](const Points<D>& v, Vec<D> by) HWY_ATTR {
+    const auto solved = [&](const Points<D>& v, Vec<D> factor) HWY_ATTR {
         const auto along = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
-            return hn::Mul(by, hn::MulAdd(a, v.x, hn::MulAdd(b, v.y, hn::Mul(c, v.z))));
+            return hn::Mul(factor, hn::MulAdd(a, v.x, hn::MulAdd(b, v.y, hn::Mul(c, v.z))));
         };
         return Points<D>{along(first.x, first.y, first.z), along(first.y, second_y, second_z),
                          along(first.z, second_z, minor)};
@@ -525,9 +526,9 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
         const float* const of_bone = block.own_bones ? weights + kLanes * k
                                      : k == 0        ? first_weights_of(frame, b) + lane
                                                      : weights + kLanes * (k - 1);
-        Points<D> by;
-        if (!scaled(d, *frame.palette, bones[k], rest, by)) continue;
-        const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), by);
+        Points<D> added;
+        if (!scaled(d, *frame.palette, bones[k], rest, added)) continue;
+        const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), added);
         total = add_scaled<D>(total, hn::Load(d, of_bone), rotated);
     }
     return total;

@@ -75,16 +75,17 @@ HWY_INLINE Points<D> limited(D d, const BulgeFrame& frame, std::size_t b, std::s
     for (std::size_t k = 0; k < count; ++k) {
         const BulgeBone& bone = bone_of(k);
         const Vec<D> weight = weight_of(k);
-        const Points<D> own = nearest_of_segment(d, bone, p);
+        const Points<D> on_segment = nearest_of_segment(d, bone, p);
         const Vec<D> stretch = hn::Set(d, bone.head.value[3]);
         if constexpr (kForm == BulgeForm::continuous) {
-            nearest = add_scaled<D>(nearest, weight, own);
+            nearest = add_scaled<D>(nearest, weight, on_segment);
             if constexpr (kStretched) stretched = hn::MulAdd(weight, stretch, stretched);
         } else {
             const auto heavier = hn::Gt(weight, most);
             most = hn::Max(weight, most);
-            nearest = {hn::IfThenElse(heavier, own.x, nearest.x), hn::IfThenElse(heavier, own.y, nearest.y),
-                       hn::IfThenElse(heavier, own.z, nearest.z)};
+            nearest = {hn::IfThenElse(heavier, on_segment.x, nearest.x),
+                       hn::IfThenElse(heavier, on_segment.y, nearest.y),
+                       hn::IfThenElse(heavier, on_segment.z, nearest.z)};
             stretched = hn::IfThenElse(heavier, stretch, stretched);
         }
     }
@@ -204,9 +205,10 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end,
             float most = 0.0f;
             for (std::size_t k = 0; k < pointers.blocks[b].influences; ++k) {
                 const auto [bone, weight] = influence_at(*frame.mesh, b, lane, k);
-                const auto own = nearest_of_segment(d, frame.segments[static_cast<std::size_t>(bone)], p);
-                nearest = add_scaled<One>(nearest, hn::Set(d, weight), own);
-                const float distance = length_of(subtract<One>(own, p));
+                const auto on_segment =
+                    nearest_of_segment(d, frame.segments[static_cast<std::size_t>(bone)], p);
+                nearest = add_scaled<One>(nearest, hn::Set(d, weight), on_segment);
+                const float distance = length_of(subtract<One>(on_segment, p));
                 mean += weight * distance;
                 if (weight > most) to_heaviest = distance;
                 most = weight > most ? weight : most;

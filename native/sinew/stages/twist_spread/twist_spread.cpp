@@ -115,9 +115,9 @@ HWY_INLINE Vec<D> shortest(D d, Vec<D> half_angle) {
 
 /// What a rotation adds to the point with these distances along two axes, as `images` of the axes.
 template <class D>
-HWY_INLINE Points<D> swept(D d, const float (&images)[2][3], const Turned<D>& by, Vec<D> a, Vec<D> b) {
-    const Vec<D> more_a = hn::NegMulSub(by.versine, a, hn::Mul(by.sine, b));
-    const Vec<D> more_b = hn::MulSub(by.sine, a, hn::Mul(by.versine, b));
+HWY_INLINE Points<D> swept(D d, const float (&images)[2][3], const Turned<D>& rotation, Vec<D> a, Vec<D> b) {
+    const Vec<D> more_a = hn::NegMulSub(rotation.versine, a, hn::Mul(rotation.sine, b));
+    const Vec<D> more_b = hn::MulSub(rotation.sine, a, hn::Mul(rotation.versine, b));
     return add_scaled<D>(times<D>(more_b, in_all_lanes(d, images[1])), more_a, in_all_lanes(d, images[0]));
 }
 
@@ -129,8 +129,8 @@ HWY_INLINE Vec<D> arm_of(D d, const TwistLine& line, std::size_t axis, const Poi
 
 /// What a rotation about a line adds to a point.
 template <class D>
-HWY_INLINE Points<D> spun(D d, const TwistLine& line, const Turned<D>& by, const Points<D>& p) {
-    return swept(d, line.axes, by, arm_of(d, line, 0, p), arm_of(d, line, 1, p));
+HWY_INLINE Points<D> spun(D d, const TwistLine& line, const Turned<D>& rotation, const Points<D>& p) {
+    return swept(d, line.axes, rotation, arm_of(d, line, 0, p), arm_of(d, line, 1, p));
 }
 
 /// TwistSpreadStage::missing_turns(), lane by lane: few frames need it.
@@ -161,7 +161,7 @@ struct Twisting {
 /// rest_of  rest_of() returns the rest points, in the space of the bones
 template <bool kLinear, class D, class RestOf>
 HWY_INLINE void twist_by(D d, const TwistFrame& frame, const BlockTwist& twist, std::size_t lane,
-                         const RestOf& rest_of, Twisting<D>& of) {
+                         const RestOf& rest_of, Twisting<D>& vertices) {
     const TwistedBone& bone = frame.twisted[twist.twist];
     const auto load = [d, lane](const Lanes<float>& numbers)
                           HWY_ATTR { return hn::Load(d, numbers.lane.data() + lane); };
@@ -171,26 +171,26 @@ HWY_INLINE void twist_by(D d, const TwistFrame& frame, const BlockTwist& twist, 
         share = hn::Add(share, more);
     }
     Vec<D> angle = hn::MulAdd(share, hn::Set(d, bone.angle), hn::Set(d, bone.offset));
-    if (frame.weights != nullptr) angle = hn::Mul(of.mask, angle);
+    if (frame.weights != nullptr) angle = hn::Mul(vertices.mask, angle);
     const Turned<D> own(d, bone.is_short ? angle : shortest(d, angle));
     // Times the weight, as the arms are.
     const auto by_own = [&]() HWY_ATTR {
         return swept(d, bone.images, own, load(twist.arms[0]), load(twist.arms[1]));
     };
     if constexpr (kLinear) {
-        of.added = add<D>(of.added, by_own());
+        vertices.added = add<D>(vertices.added, by_own());
         return;
     }
-    const auto add_times = [&](Vec<D> factor, const Points<D>& by) HWY_ATTR {
-        of.added = add_scaled<D>(of.added, factor, by);
-        of.point = add_scaled<D>(of.point, factor, by);
+    const auto add_times = [&](Vec<D> factor, const Points<D>& more) HWY_ATTR {
+        vertices.added = add_scaled<D>(vertices.added, factor, more);
+        vertices.point = add_scaled<D>(vertices.point, factor, more);
     };
-    const Points<D> before = of.point;
+    const Points<D> before = vertices.point;
     const Vec<D> one = hn::Set(d, 1.0f);
     const bool are_alike = frame.blend == frame.mix_blend;
     for (std::size_t k = 0; k < (are_alike ? 1 : 2); ++k) {
         const TwistBlend blend = k == 0 ? frame.blend : frame.mix_blend;
-        const Vec<D> portion = are_alike ? one : k == 0 ? hn::Sub(one, of.mix) : of.mix;
+        const Vec<D> portion = are_alike ? one : k == 0 ? hn::Sub(one, vertices.mix) : vertices.mix;
         if (blend == TwistBlend::linear) {
             add_times(portion, by_own());
             continue;
@@ -199,17 +199,17 @@ HWY_INLINE void twist_by(D d, const TwistFrame& frame, const BlockTwist& twist, 
         const Vec<D> weight = load(twist.weight);
         Vec<D> posed_angle = hn::Mul(weight, angle);
         if (frame.goes_around) {
-            const Vec<D> turns = missing_turns(d, blend, bone, load(twist.below), of.mask);
+            const Vec<D> turns = missing_turns(d, blend, bone, load(twist.below), vertices.mask);
             posed_angle = hn::MulAdd(turns, hn::Set(d, std::numbers::pi_v<float>), posed_angle);
         }
         const bool is_short = bone.is_short && !frame.goes_around;
         const Turned<D> posed(d, is_short ? posed_angle : shortest(d, posed_angle));
-        Points<D> by = spun(d, bone.posed, posed, before);
+        Points<D> moved = spun(d, bone.posed, posed, before);
         if (bone.is_scaled) {
             const Points<D> alone = spun(d, bone.posed, own, displaced(d, bone.displacement, rest_of()));
-            by = add<D>(by, subtract<D>(by_own(), times<D>(weight, alone)));
+            moved = add<D>(moved, subtract<D>(by_own(), times<D>(weight, alone)));
         }
-        add_times(portion, by);
+        add_times(portion, moved);
     }
 }
 
@@ -246,13 +246,13 @@ void spread_blocks(const TwistFrame& shared, std::size_t begin, std::size_t end)
                 const BlockTwist& twist = frame.block_twists[t];
                 if (moves(frame, twist)) twist_by<kLinear>(d, frame, twist, lane, rest_of, vertices);
             }
-            const Points<Full> by = vector_to_model(d, frame.spaces, vertices.added);
+            const Points<Full> added = vector_to_model(d, frame.spaces, vertices.added);
             // A sum with 0 would change the sign of -0.
             const auto sum = [&](Vec<Full> number, Vec<Full> more) HWY_ATTR {
                 return hn::IfThenElse(hn::Eq(more, zero), number, hn::Add(number, more));
             };
             store_points(d, pointers, b, lane,
-                         Points<Full>{sum(point.x, by.x), sum(point.y, by.y), sum(point.z, by.z)});
+                         Points<Full>{sum(point.x, added.x), sum(point.y, added.y), sum(point.z, added.z)});
         }
     }
 }

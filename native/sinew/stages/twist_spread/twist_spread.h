@@ -175,8 +175,8 @@ struct TwistSpreadStage {
         const T e = share(bone.head, bone.tail, bone.curve, rest);
         const T turns = mask * bone.angle * (bone.is_from_parent ? e - T(1) : e);
         // With the bone's matrix M, linear blending by M R(turns) instead of M.
-        const Vec3<T> own = bone.motion.linear * spun(bone.origin, bone.axis, turns, rest);
-        if (blend == TwistBlend::linear) return weight * own;
+        const Vec3<T> linear = bone.motion.linear * spun(bone.origin, bone.axis, turns, rest);
+        if (blend == TwistBlend::linear) return weight * linear;
         const Vec3<T> posed_axis = bone.motion.linear * bone.axis;
         const T length = glm::length(posed_axis);
         if (!(length > T(0))) return Vec3<T>(T(0));
@@ -185,10 +185,10 @@ struct TwistSpreadStage {
         const Vec3<T> axis =
             (glm::determinant(bone.motion.linear) < T(0) ? T(-1) : T(1)) / length * posed_axis;
         const T missing = missing_turns(blend, bone.around, below, mask * bone.part);
-        const Vec3<T> by = spun(origin, axis, weight * turns + missing, point);
-        if (!bone.is_scaled) return by;
+        const Vec3<T> rotated = spun(origin, axis, weight * turns + missing, point);
+        if (!bone.is_scaled) return rotated;
         // A scaled bone keeps its scaled shape: a vertex of this bone alone is moved by M R(turns).
-        return by + weight * (own - spun(origin, axis, turns, transform_point(bone.motion, rest)));
+        return rotated + weight * (linear - spun(origin, axis, turns, transform_point(bone.motion, rest)));
     }
 
     /// The vertex after twisting by one bone. Call per bone, in reverse order of TwistSpreadData::twists.
