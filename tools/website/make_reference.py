@@ -283,15 +283,16 @@ def cpp_api() -> str:
 
 
 def public_headers() -> list[str]:
-    """Those that are installed, but for the definitions of methods and stages."""
+    """Those that are installed, but for the definitions of methods."""
     described = (HEADERS / "CMakeLists.txt").read_text(encoding="utf-8")
     listed = re.search(r"list\(APPEND headers\s+([^)]*)\)", described)
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
     top = sorted({path.name for path in HEADERS.glob("*.h")} - {"sinew.h", "deformer_state.h"})
     folders = ("transform", "interpolate", "skeleton")
-    others = [path.relative_to(HEADERS).as_posix() for f in folders for path in (HEADERS / f).glob("*.h")]
-    return [*top, *listed[1].split(), *sorted(others)]
+    others = [path for f in folders for path in (HEADERS / f).glob("*.h")]
+    others += [path for path in HEADERS.glob("stages/*/*.h") if path.stem == path.parent.name]
+    return [*top, *listed[1].split(), *sorted(path.relative_to(HEADERS).as_posix() for path in others)]
 
 
 def declarations(header: str) -> str:
