@@ -12,7 +12,6 @@ NAMES = (
     *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Lock", "Method", "Normals", "Parameter"),
     *(
         "Precomputation",
-        "Skeleton",
         "SkinnedNormals",
         "Stage",
         "TwistSpread",

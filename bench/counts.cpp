@@ -10,11 +10,11 @@
 
 #include "scenes.h"
 #include "sinew/base/simd.h"
-#include "sinew/bulge_limit.h"
-#include "sinew/delta_mush.h"
 #include "sinew/methods/methods.h"
 #include "sinew/skinned_normals.h"
-#include "sinew/twist_spread.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
 
 namespace {
 

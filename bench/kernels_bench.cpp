@@ -9,9 +9,9 @@
 #include "scenes.h"
 #include "sinew/base/simd.h"
 #include "sinew/base/thread_pool.h"
-#include "sinew/bulge_limit.h"
 #include "sinew/methods/methods.h"
-#include "sinew/twist_spread.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
 
 namespace {
 

@@ -12,7 +12,8 @@ py::object named_tuple(const char* name, const py::tuple& parts) {
 }  // namespace sinew::bindings
 
 PYBIND11_MODULE(future_work_native, m) {
-    m.doc() = "Fits and inverse kinematics. Use it through the package `future_work`.";
+    m.doc() = "Curves, fits and inverse kinematics. Use it through the package `future_work`.";
+    sinew::bindings::bind_curves(m);
     sinew::bindings::bind_fit(m);
     sinew::bindings::bind_ik(m);
 }

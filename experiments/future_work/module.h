@@ -5,6 +5,7 @@
 
 namespace sinew::bindings {
 
+void bind_curves(py::module_& m);
 void bind_fit(py::module_& m);
 void bind_ik(py::module_& m);
 

@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""What fits and solvers return."""
+"""What curves, fits and solvers return."""
 
 from typing import Any, Generic, NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from sinew._types import Blended as Blended
 
 Float = TypeVar("Float", np.float32, np.float64)
 

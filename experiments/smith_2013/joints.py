@@ -33,7 +33,7 @@ def arms(method: sinew.interpolate.Method, t: np.ndarray, from_root: bool) -> np
     if from_root:
         # The result of algorithm 1, interpolated by algorithm 2: the wrong order.
         ends = [skeleton.root_relative(end) for end in ends]
-    bones, _defined = skeleton.interpolate(ends[0], ends[1], t, method)
+    bones = sinew.interpolate.between(ends[0], ends[1], t[:, None], method).transforms
     if not from_root:
         bones = np.array([skeleton.root_relative(each) for each in bones])
     points = np.array([[0.0, 0, 0], [1.0, 0, 0]])

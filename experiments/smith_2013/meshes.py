@@ -95,7 +95,7 @@ class Chain:
                 relative = getattr(sinew.affine, f"to_{name}")(relative)
             keys.append(relative)
         first, second = keys
-        relative, _is_defined = skeleton.interpolate(first, second, t, method)
+        relative = sinew.interpolate.between(first, second, t, method).transforms
         pose = skeleton.root_relative(relative)
         if module is not sinew.affine:
             pose = module.to_affine(pose)

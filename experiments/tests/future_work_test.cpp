@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// Protects the memory of fits and of inverse kinematics, and whatever sizes are given; the tests in Python have the
+// Protects the memory of curves, fits and inverse kinematics, and whatever sizes are given; the tests in Python have the
 // oracles.
 #include <array>
 #include <cstdlib>
@@ -7,6 +7,7 @@
 #include <new>
 #include <vector>
 
+#include "future_work/curves/hermite.h"
 #include "future_work/fit/average.h"
 #include "future_work/fit/hand_eye.h"
 #include "future_work/ik/solver.h"
@@ -53,6 +54,21 @@ TYPED_TEST(Average, leaves_outliers_out) {
     EXPECT_GT(kept.front(), T(0.5));
     EXPECT_FALSE(average<T>({}).is_defined);
     EXPECT_FALSE(robust_average<T>({}, {}, {}).is_defined);
+}
+
+TEST(Hermite, sizes_that_do_not_fit_read_nothing) {
+    const std::vector<Vec3<double>> points(4, Vec3<double>(1.0));
+    const std::vector<DualQuat<double>> keys(4);
+    const std::vector<Twist<double>> velocities(4);
+    const std::vector<double> times{0.0, 1.0, 2.0, 3.0};
+    const auto few = [](const auto& all) { return std::span(all).first(2); };
+    EXPECT_EQ(hermite<double>(few(points), points, times, 2.5), Vec3<double>(0.0));
+    EXPECT_EQ(hermite<double>(points, few(points), times, 2.5), Vec3<double>(0.0));
+    EXPECT_EQ(hermite<double>(std::span<const Vec3<double>>(), {}, {}, 2.5), Vec3<double>(0.0));
+    EXPECT_FALSE(hermite<double>(few(keys), velocities, times, 2.5).is_defined);
+    EXPECT_FALSE(hermite<double>(keys, few(velocities), times, 2.5).is_defined);
+    EXPECT_FALSE(hermite<double>(std::span<const DualQuat<double>>(), {}, {}, 2.5).is_defined);
+    EXPECT_TRUE(hermite<double>(keys, velocities, times, 2.5).is_defined);
 }
 
 TEST(Fits, of_numbers_that_differ_are_not_defined) {

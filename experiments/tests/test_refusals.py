@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 import sinew
-from future_work import fit, ik
+from future_work import curves, fit, ik
 
 KEYS = sinew.dual_quat.from_screw_about([1, 2, 3], [0, 0, 1], np.arange(5) / 4, np.arange(5) / 2)
 POINTS = np.float32([[0, 0, 0], [1, 1, 1]])
@@ -22,6 +22,10 @@ def solve(**given):
 CALLS = {
     "Solver": (solver, {}),
     "solve": (solve, CHAIN),
+    "hermite": (
+        curves.hermite,
+        {"keys": KEYS[:, :3], "tangents": KEYS[:, 1:4], "times": np.arange(5.0), "at": 0.5},
+    ),
     "rigid": (fit.rigid, {"source": POINTS, "target": POINTS}),
     "hand_eye": (fit.hand_eye, {"a": KEYS, "b": KEYS}),
     "average": (fit.average, {"poses": KEYS}),
@@ -40,6 +44,9 @@ ROWS = [
     ("solve", "tips", [[0, np.inf, 0]]),
     ("solve", "iterations", -1),
     ("solve", "poles", None),
+    ("hermite", "tangents", KEYS[:2, :3]),
+    ("hermite", "times", [0, 1]),
+    ("hermite", "keys", KEYS[:, :7]),
     ("rigid", "target", np.zeros((4, 3), np.float32)),
     ("rigid", "source", POINTS * np.float32(np.nan)),
     ("rigid", "weights", np.ones(3)),

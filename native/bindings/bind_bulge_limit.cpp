@@ -5,8 +5,7 @@
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "parameters.h"
-#include "sinew/bulge_limit.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
 #include "stages.h"
 
 namespace sinew::bindings {
@@ -36,41 +35,27 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
     const auto given = checked_points(points, "points", limit.vertex_count());
     const std::vector<Affine<float>> bones = checked_bones(bone_transforms, limit.bone_count());
     BulgeLimitOptions options;
-    const auto checked_option = [](const py::object& value, const std::string& id) {
-        const Parameter& parameter = parameter_of(BulgeLimitStage::kParameters, id);
-        return checked_parameter(value, parameter, id.c_str(), "bulge_limit." + id);
-    };
-    options.strength = static_cast<float>(checked_option(strength, "strength"));
-    options.form = static_cast<BulgeForm>(static_cast<int>(checked_option(form, "form")));
+    options.strength = static_cast<float>(checked_option<BulgeLimitStage>(strength, "strength"));
+    options.form = static_cast<BulgeForm>(static_cast<int>(checked_option<BulgeLimitStage>(form, "form")));
     options.threads = checked_threads(threads);
     return applied(limit, given, out, [&](auto to) { return limit.apply(to, {bones}, options); });
 }
 
 }  // namespace
 
-void bind_bulge_limit(py::module_& m) {
-    py::class_<Timed<BulgeLimit>>(
+void bind_stage(py::module_& m, BulgeLimitStage) {
+    auto type = stage_class<BulgeLimit>(
         m, "BulgeLimit",
         R"(The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
-them farther away than they are at rest (Kim, Han 2014, and a continuous form).)")
-        .def(py::init(&make), "binding"_a, "heads"_a, "tails"_a, py::kw_only(),
+them farther away than they are at rest (Kim, Han 2014, and a continuous form).)",
+        "bones", [](const BulgeLimit& limit) { return limit.bone_count(); });
+    def_bones(type);
+    type.def(py::init(&make), "binding"_a, "heads"_a, "tails"_a, py::kw_only(),
              "bones_from_model"_a = py::none(), "weights"_a = py::none(),
              R"(binding: the mesh. Its memory is shared.
 heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
 bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
 weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.)")
-        .def_property_readonly("vertex_count", &BulgeLimit::vertex_count, kVertexCount)
-        .def_property_readonly("bone_count", &BulgeLimit::bone_count, kBoneCount)
-        .def("__repr__",
-             [](const Timed<BulgeLimit>& limit) {
-                 return "<sinew.BulgeLimit: " + std::to_string(limit.vertex_count()) + " vertices, " +
-                        std::to_string(limit.bone_count()) + " bones>";
-             })
-        .def(
-            "set_rest_points", &set_rest_points<BulgeLimit>, "rest_points"_a,
-            "bones_from_model"_a = py::none(),
-            R"(Sets other rest points, float32 [vertices, 3], or another space of the bones. Measures distances at
-rest again, which takes about as long as apply().)")
         .def("apply", &apply, "points"_a, "bone_transforms"_a, "out"_a = py::none(), py::kw_only(),
              "strength"_a = 1.0, "form"_a = "continuous", "threads"_a = py::none(),
              R"(The limited points, float32 [vertices, 3], model space.

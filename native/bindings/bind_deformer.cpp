@@ -14,6 +14,7 @@
 #include "sinew/mesh/check_arrays.h"
 #include "sinew/methods/methods.h"
 #include "sinew/skeleton/continued_rotations.h"
+#include "sinew/stages/mix/mix.h"
 
 namespace sinew::bindings {
 MeshArguments::MeshArguments(const py::object& rest_points, const py::object& influence_offsets,
@@ -341,6 +342,9 @@ void set_rest_points(Timed<Deformer>& deformer, const ArrayLike& rest_points) {
 }
 
 }  // namespace
+
+/// An argument of Deformer.
+void bind_stage(py::module_& /*m*/, sinew::Mix) {}
 
 void bind_deformer(py::module_& m) {
     py::class_<Binding>(m, "Binding",

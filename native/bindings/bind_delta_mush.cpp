@@ -4,7 +4,6 @@
 #include <string>
 
 #include "arrays.h"
-#include "sinew/delta_mush.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 #include "stages.h"
 
@@ -57,19 +56,20 @@ Timed<DeltaMush> make(const ArrayLike& rest_points, const ArrayLike& face_offset
     const auto offsets = checked<std::int32_t>(face_offsets, "face_offsets", 1, "int32 [faces + 1]");
     const auto corners = checked<std::int32_t>(corner_vertices, "corner_vertices", 1, "int32 [corners]");
     const auto ends = checked_rows<std::int32_t>(edges, "edges", 2, "int32 [edges, 2]");
-    const SettingArguments with =
+    const SettingArguments arguments =
         checked_settings(iterations, radius, factor, smooth_type, pin_boundary, weights);
-    return DeltaMush({as_span(offsets), as_span(corners), as_span(ends)}, as_points(points), with.settings);
+    return DeltaMush({as_span(offsets), as_span(corners), as_span(ends)}, as_points(points),
+                     arguments.settings);
 }
 
 void bind(Timed<DeltaMush>& mush, const ArrayLike& rest_points, const Index& iterations, const Number& radius,
           const Number& factor, const SmoothTypeName& smooth_type, const Flag& pin_boundary,
           const OptionalArrayLike& weights) {
     const auto points = checked_points(rest_points, "rest_points");
-    const SettingArguments with =
+    const SettingArguments arguments =
         checked_settings(iterations, radius, factor, smooth_type, pin_boundary, weights);
     // May have to wait for another thread that applies it.
-    without_gil([&] { mush.bind(as_points(points), with.settings); });
+    without_gil([&] { mush.bind(as_points(points), arguments.settings); });
 }
 
 py::array_t<float> apply(const Timed<DeltaMush>& mush, const ArrayLike& points, const Out& out,
@@ -80,20 +80,16 @@ py::array_t<float> apply(const Timed<DeltaMush>& mush, const ArrayLike& points, 
     return applied(mush, given, out, [&](auto to) { return mush.apply(to, details, most); });
 }
 
-std::string text_of(const Timed<DeltaMush>& mush) {
-    return "<sinew.DeltaMush: " + std::to_string(mush.vertex_count()) + " vertices, " +
-           std::to_string(mush.iterations()) + " iterations>";
-}
-
 }  // namespace
 
-void bind_delta_mush(py::module_& m) {
+void bind_stage(py::module_& m, DeltaMushStage) {
     const DeltaMushSettings initial;
     const char* const type = DeltaMushStage::kSmoothTypes[0].data();
-    py::class_<Timed<DeltaMush>>(
+    stage_class<DeltaMush>(
         m, "DeltaMush",
         R"(The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
-(Mancewicz et al. 2014), as Blender's Corrective Smooth does.)")
+(Mancewicz et al. 2014), as Blender's Corrective Smooth does.)",
+        "iterations", [](const DeltaMush& mush) { return mush.iterations(); })
         .def(py::init(&make), "rest_points"_a, "face_offsets"_a, "corner_vertices"_a, "edges"_a,
              py::kw_only(), "iterations"_a = initial.iterations, "radius"_a = initial.radius,
              "factor"_a = initial.factor, "smooth_type"_a = type, "pin_boundary"_a = initial.pin_boundary,
@@ -110,10 +106,8 @@ factor: how far one iteration moves a vertex, 0 to 1.
 smooth_type: "simple", or "length_weighted": neighbours are weighted by the length of their edges.
 pin_boundary: whether vertices on edges with a single face are not moved.
 weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.)")
-        .def_property_readonly("vertex_count", &DeltaMush::vertex_count, kVertexCount)
         .def_property_readonly("iterations", &DeltaMush::iterations,
                                "Number of smoothing iterations, also if a radius determines it.")
-        .def("__repr__", &text_of)
         .def(
             "bind", &bind, "rest_points"_a, py::kw_only(), "iterations"_a = initial.iterations,
             "radius"_a = initial.radius, "factor"_a = initial.factor, "smooth_type"_a = type,

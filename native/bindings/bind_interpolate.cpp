@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interpolations.h"
-#include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/spline.h"
 
 namespace sinew::bindings {
@@ -8,10 +7,6 @@ namespace {
 
 using Method = Typed<"sinew.interpolate.Method">;
 using Blended = NamedTuple<"Blended">;
-
-/// What the library returns, for an Output.
-template <class Transform>
-using Blend = Named<"Blended", Transform, bool>;
 
 Blended between(const ArrayLike& a, const ArrayLike& b, const ArrayLike& t, const Method& method) {
     return with_method(method, [&]<class Method>(Method) {
@@ -63,77 +58,24 @@ Blended blend(const ArrayLike& any_transforms, const ArrayLike& any_weights, con
     });
 }
 
-// Calls evaluate(keys, times, time) for each time in `at`.
-template <class T, class Key, class Evaluate>
-py::object along_keys(const py::object& keys, const py::object& times, const py::object& at,
-                      Evaluate evaluate) {
-    const auto input = checked_input<T, Key>(keys, "keys");
-    if (input.lead.size() != 1 || input.lead[0] == 0) {
-        fail("keys", "one axis of keys, at least one", describe(keys));
-    }
-    const std::vector<Key> items = items_of<Key>(input);
-    const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
-    const auto moments = checked_input<T, T>(at, "at");
-    return each_of<Blend<Key>>(moments.lead, [&](py::ssize_t i) -> Blend<Key> {
-        const auto result =
-            evaluate(std::span<const Key>(items), std::span<const T>(key_times), moments.data[i]);
-        return {result.transform, result.is_defined};
-    });
-}
-
 Blended spline(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at,
                const Method& method) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
     return with_method(method, keys, "keys", [&]<class Method, class T>() {
         return along_keys<T, typename Method::template Transform<T>>(
-            keys, times, at, [](const auto&... of) { return catmull_rom<Method, T>(of...); });
+            keys, times, at, [](const auto&... along) { return catmull_rom<Method, T>(along...); });
     });
-}
-
-// Whether the last axis of `keys` has length 3.
-bool is_of_points(const py::object& keys) {
-    if (!py::isinstance<py::array>(keys)) return false;
-    const auto array = py::reinterpret_borrow<py::array>(keys);
-    return array.ndim() > 0 && array.shape(array.ndim() - 1) == 3;
 }
 
 Blended spline_of_vectors(const ArrayLike& any_keys, const ArrayLike& any_times, const ArrayLike& any_at) {
     const auto [keys, times, at] = promoted<3>({"keys", "times", "at"}, {any_keys, any_times, any_at});
-    const auto evaluate = [](const auto&... of) { return catmull_rom_vector(of...); };
+    const auto evaluate = [](const auto&... along) { return catmull_rom_vector(along...); };
     if (is_of_points(keys)) {
         return with_element(keys, "keys", "",
                             [&]<class T>(T) { return along_keys<T, Vec3<T>>(keys, times, at, evaluate); });
     }
     return with_layout(keys, "keys", "keys", [&]<class Transform, class T>() {
         return along_keys<T, Transform>(keys, times, at, evaluate);
-    });
-}
-
-template <class T, class Key, class Tangent>
-py::object hermite_items(const std::array<py::object, 4>& values) {
-    const auto keys = checked_input<T, Key>(values[0], "keys");
-    const auto input = checked_input<T, Tangent>(values[1], "tangents");
-    const std::vector<Tangent> tangents = items_of<Tangent>(input);
-    if (keys.lead.size() == 1 && input.lead != keys.lead) {
-        fail("tangents", shape_text({keys.lead[0]}) + " of them, one for each key", describe(values[1]));
-    }
-    return along_keys<T, Key>(values[0], values[2], values[3], [&](auto of, auto times, T time) {
-        const auto found = hermite<T>(of, std::span<const Tangent>(tangents), times, time);
-        if constexpr (std::is_same_v<Key, Vec3<T>>) {
-            return sinew::Blended<Key>{found, is_finite(found)};
-        } else {
-            return found;
-        }
-    });
-}
-
-Blended hermite_spline(const ArrayLike& keys, const ArrayLike& tangents, const ArrayLike& times,
-                       const ArrayLike& at) {
-    const auto values = promoted<4>({"keys", "tangents", "times", "at"}, {keys, tangents, times, at});
-    const bool has_points = is_of_points(values[0]);
-    return with_element(values[0], "keys", "[n, 3] or [n, 8]", [&]<class T>(T) {
-        return has_points ? hermite_items<T, Vec3<T>, Vec3<T>>(values)
-                          : hermite_items<T, DualQuat<T>, Twist<T>>(values);
     });
 }
 
@@ -176,15 +118,6 @@ from converging: the result is then not defined, finite, and may jump.)");
 3).
 
 Rigid only at the keys; the layout's normalized() makes it rigid everywhere.)");
-    splines.def("hermite", &hermite_spline, "keys"_a, "tangents"_a, "times"_a, "at"_a,
-                R"(The cubic Hermite spline through keys with arbitrary tangents (Smith 2013, section 2.3.2).
-
-keys: [n, 3], points, or [n, 8], rigid transforms.
-tangents: for a unit of time. Of points [n, 3]. Of transforms [n, 6], twists in each key's own axes: after a
-    short time h the curve is compose(key, from_twist(h * tangent)).
-
-For transforms it is a Bezier curve whose chords are screws (Shoemake 1985, for quaternions): rigid throughout.
-Not defined where "sclerp" is not defined between two of its control poses.)");
 }
 
 }  // namespace sinew::bindings

@@ -42,8 +42,8 @@ py::tuple tuple_of(const Range& range) {
 
 Texts names_of(Needs needs) {
     py::list names;
-    const auto add = [&](Needs of, const char* name) {
-        if (has(needs, of)) names.append(name);
+    const auto add = [&](Needs flag, const char* name) {
+        if (has(needs, flag)) names.append(name);
     };
     add(Needs::rest_bones, "rest_bones");
     add(Needs::vertex_data, "vertex_data");
@@ -54,25 +54,25 @@ Texts names_of(Needs needs) {
 
 /// A property with the text of this field.
 template <auto field, class Class>
-void def_text(Class& of, const char* name, const char* doc) {
-    of.def_property_readonly(
+void def_text(Class& type, const char* name, const char* doc) {
+    type.def_property_readonly(
         name, [](const typename Class::type& row) { return text(row.*field); }, doc);
 }
 
 /// The properties that methods and stages have in common.
 template <class Row>
-void def_facts(py::class_<Row>& of, const char* type) {
-    def_text<&Row::name>(of, "name", "The name in programs.");
-    def_text<&Row::label>(of, "label", "The name in the interface.");
-    def_text<&Row::description>(of, "description", "One sentence: when to use it.");
-    def_text<&Row::source>(of, "source", "The papers.");
-    of.def_property_readonly(
+void def_facts(py::class_<Row>& type, const char* name) {
+    def_text<&Row::name>(type, "name", "The name in programs.");
+    def_text<&Row::label>(type, "label", "The name in the interface.");
+    def_text<&Row::description>(type, "description", "One sentence: when to use it.");
+    def_text<&Row::source>(type, "source", "The papers.");
+    type.def_property_readonly(
         "parameters", [](const Row& row) -> Typed<"tuple[sinew._native.Parameter, ...]"> {
             return tuple_of<Parameter>(row.parameters);
         },
         "Its settings.");
-    of.def("__repr__",
-           [type](const Row& row) { return "<sinew." + std::string(type) + " " + text(row.name) + ">"; });
+    type.def("__repr__",
+             [name](const Row& row) { return "<sinew." + std::string(name) + " " + text(row.name) + ">"; });
 }
 
 }  // namespace
@@ -131,8 +131,7 @@ are computed; "precomputation", a function that computes them.)")
         "All skinning methods.");
     m.def(
         "stages", []() -> Typed<"tuple[sinew._native.Stage, ...]"> { return tuple_of<StageInfo>(kStages); },
-        "All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is "
-        "BulgeLimit, `delta_mush` is DeltaMush.");
+        "All stages. `mix` is an argument of Deformer, each other a class: `bulge_limit` is BulgeLimit.");
 }
 
 }  // namespace sinew::bindings

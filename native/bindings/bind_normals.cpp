@@ -75,12 +75,12 @@ Timed<Normals> make(const Index& vertex_count, const ArrayLike& face_offsets,
 py::array_t<float> compute(const Timed<Normals>& normals, const ArrayLike& points,
                            const OptionalDomain& domain, const Out& out, const Threads& threads) {
     const auto given = checked_points(points, "points", normals.count(NormalDomain::vertex));
-    const NormalDomain of = checked_domain(normals, domain);
+    const NormalDomain wanted = checked_domain(normals, domain);
     const std::size_t most = checked_threads(threads);
-    py::array_t<float> result = checked_out(out, normals.count(of));
+    py::array_t<float> result = checked_out(out, normals.count(wanted));
     check_apart(result, given);
     const auto to = as_points_to_write(result);
-    normals.call([&] { return normals.compute(of, as_points(given), to, most); });
+    normals.call([&] { return normals.compute(wanted, as_points(given), to, most); });
     return result;
 }
 

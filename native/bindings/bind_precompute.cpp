@@ -98,7 +98,8 @@ public:
         if (!is_cancelled_) job_.rethrow();
         if (is_cancelled_ || !numbers_) return py::none();
         // Not copied: numpy lets other threads run meanwhile, which may want the result, too.
-        const py::capsule owner(new Numbers(numbers_), [](void* of) { delete static_cast<Numbers*>(of); });
+        const py::capsule owner(new Numbers(numbers_),
+                                [](void* numbers) { delete static_cast<Numbers*>(numbers); });
         const auto rows = static_cast<py::ssize_t>(numbers_->size()) / width_;
         const py::array_t<float> made({rows, width_}, numbers_->data(), owner);
         if (!result_) result_ = made;
@@ -137,8 +138,8 @@ Running centres(const ArrayLike& rest_points, const ArrayLike& influence_offsets
                 const ArrayLike& influence_bones, const ArrayLike& influence_weights,
                 const ArrayLike& triangles, bool exact, const Threads& threads, bool gives_way) {
     Mesh mesh({rest_points, influence_offsets, influence_bones, influence_weights}, triangles);
-    const auto make = [exact](const Mesh& of, Job& job) {
-        const auto found = centres_of_rotation(of.data(), of.corners, job, exact);
+    const auto make = [exact](const Mesh& bound, Job& job) {
+        const auto found = centres_of_rotation(bound.data(), bound.corners, job, exact);
         const auto* const numbers = reinterpret_cast<const float*>(found.data());
         return std::vector<float>(numbers, numbers + 3 * found.size());
     };
@@ -152,8 +153,8 @@ Running moments(const ArrayLike& rest_points, const ArrayLike& influence_offsets
     Mesh mesh({rest_points, influence_offsets, influence_bones, influence_weights}, triangles);
     [[maybe_unused]] const std::size_t most = checked_threads(threads);
 #if SINEW_WITH_DDM
-    const auto make = [radius, exact](const Mesh& of, Job& job) {
-        return direct_delta_mush(of.data(), of.corners, radius, job, exact);
+    const auto make = [radius, exact](const Mesh& bound, Job& job) {
+        return direct_delta_mush(bound.data(), bound.corners, radius, job, exact);
     };
     return std::make_unique<Precomputation>(most, gives_way, std::move(mesh), kMomentFloats, make);
 #else
@@ -178,8 +179,8 @@ cancelled when nobody refers to it any more, and when Python ends.)")
              "KeyboardInterrupt.")
         .def(
             "result",
-            [](Precomputation& of) {
-                return Typed<"numpy.typing.NDArray[numpy.float32] | None">(of.result());
+            [](Precomputation& running) {
+                return Typed<"numpy.typing.NDArray[numpy.float32] | None">(running.result());
             },
             R"(Waits until it has ended, and returns the array, the same one each time; None if it was cancelled, or if
 this is a process that was forked meanwhile. Raises what the work raised: ValueError for data that Binding

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include "interpolations.h"
 #include "sinew/skeleton/forward_kinematics.h"
-#include "sinew/skeleton/keyframes.h"
 
 namespace sinew::bindings {
 namespace {
@@ -73,85 +72,6 @@ Array branch_updated(const Skeleton& skeleton, const ArrayLike& any_relative, co
     });
 }
 
-using Method = Typed<"sinew.interpolate.Method">;
-using Frames = Typed<"tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]">;
-
-// (transforms, is_defined) from run(moment, bones) for each number in `at`: for one number [bones, ..] and a
-// bool, for numbers [..] the shapes [.., bones, ..] and [..].
-template <class Transform, class T, class Run>
-py::object at_all(const Skeleton& skeleton, const Input<T>& at, Run run) {
-    Shape shape = at.lead;
-    shape.push_back(static_cast<py::ssize_t>(skeleton.bone_count()));
-    Output<Transform> transforms(shape);
-    Output<bool> is_defined(at.lead);
-    const py::ssize_t count = count_of(at.lead);
-    const auto bone_count = static_cast<py::ssize_t>(skeleton.bone_count());
-    without_gil([&] {
-        std::vector<Transform> bones(skeleton.bone_count());
-        for (py::ssize_t i = 0; i < count; ++i) {
-            is_defined.write(i, run(at.data[i], std::span<Transform>(bones)));
-            for (py::ssize_t bone = 0; bone < bone_count; ++bone) {
-                transforms.write(i * bone_count + bone, bones[static_cast<std::size_t>(bone)]);
-            }
-        }
-    });
-    if (at.lead.empty()) return py::make_tuple(transforms.take(), static_cast<bool>(is_defined.data[0]));
-    return py::make_tuple(transforms.take(), is_defined.take());
-}
-
-Frames interpolate(const Skeleton& skeleton, const ArrayLike& any_a, const ArrayLike& any_b,
-                   const ArrayLike& any_t, const Method& method) {
-    const auto [a, b, t] = promoted<3>({"a", "b", "t"}, {any_a, any_b, any_t});
-    return with_method(method, a, "a", [&]<class Method, class T>() {
-        using Transform = typename Method::template Transform<T>;
-        const auto from = checked_bones<Transform, T>(skeleton, a, "a");
-        const auto onto = checked_bones<Transform, T>(skeleton, b, "b");
-        return at_all<Transform, T>(skeleton, checked_input<T, T>(t, "t"), [&](T part, auto bones) {
-            return interpolate_keyframes<Method, T>(skeleton, from, onto, part, bones);
-        });
-    });
-}
-
-// Calls run(keyframes, times, time, bones) with checked arrays.
-template <class Transform, class T, class Run>
-py::object spline_bones(const Skeleton& skeleton, const py::object& keyframes, const py::object& times,
-                        const py::object& time, Run run) {
-    const auto input = checked_input<T, Transform>(keyframes, "keyframes");
-    const auto bone_count = static_cast<py::ssize_t>(skeleton.bone_count());
-    if (input.lead.size() != 2 || input.lead[0] == 0 || input.lead[1] != bone_count) {
-        fail("keyframes", "one key or more of " + std::to_string(bone_count) + " bones", describe(keyframes));
-    }
-    const std::vector<Transform> keys = items_of<Transform>(input);
-    const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
-    return at_all<Transform, T>(skeleton, checked_input<T, T>(time, "time"), [&](T now, auto bones) {
-        return run(std::span<const Transform>(keys), std::span<const T>(key_times), now, bones);
-    });
-}
-
-Frames spline(const Skeleton& skeleton, const ArrayLike& any_keyframes, const ArrayLike& any_times,
-              const ArrayLike& any_time, const Method& method) {
-    const auto [keyframes, times, time] =
-        promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
-    return with_method(method, keyframes, "keyframes", [&]<class Method, class T>() {
-        return spline_bones<typename Method::template Transform<T>, T>(
-            skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
-                return spline_keyframes<Method, T>(skeleton, keys, at, now, bones);
-            });
-    });
-}
-
-Frames spline_vector_form(const Skeleton& skeleton, const ArrayLike& any_keyframes,
-                          const ArrayLike& any_times, const ArrayLike& any_time) {
-    const auto [keyframes, times, time] =
-        promoted<3>({"keyframes", "times", "time"}, {any_keyframes, any_times, any_time});
-    return with_layout(keyframes, "keyframes", "keys, bones", [&]<class Transform, class T>() {
-        return spline_bones<Transform, T>(
-            skeleton, keyframes, times, time, [&](auto keys, auto at, T now, auto bones) {
-                return spline_keyframes_vector<Transform, T>(skeleton, keys, at, now, bones);
-            });
-    });
-}
-
 }  // namespace
 
 void bind_skeleton(py::module_& m) {
@@ -183,30 +103,7 @@ root: None, or a transform that is applied after that of every bone without a pa
 
 root_relative: the result before the change, in the layout of `transforms`.
 transforms, root: as for root_relative().
-bone: the index of the changed bone.)")
-        .def("interpolate", &interpolate, "a"_a, "b"_a, "t"_a, "method"_a = "dlb",
-             R"((transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
-
-a, b: [bones, ..] in the layout of the method, at t = 0 and t = 1.
-t: a number, or [..], for which the results are [.., bones, ..] and [..]; extrapolates outside 0 to 1.
-method: one of sinew.interpolate.METHODS.
-
-is_defined is False if the result is not defined for some bone, which then has the result that
-sinew.interpolate specifies.)")
-        .def(
-            "spline", &spline, "keyframes"_a, "times"_a, "time"_a, "method"_a = "dlb",
-            R"((transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend form (Smith
-2013, algorithm 3 and section 3.2.2).
-
-keyframes: [keys, bones, ..] in the layout of the method, at least one key.
-times: [keys], non-decreasing; keys of equal time are a cut.
-time: a number, or [..], for which the results are [.., bones, ..] and [..]; constant before the first key and
-    after the last.
-method: one of sinew.interpolate.METHODS.)")
-        .def("spline_vector", &spline_vector_form, "keyframes"_a, "times"_a, "time"_a,
-             R"(As spline(), in vector form (Smith 2013, algorithm 3): not rigid between keys.
-
-keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].)");
+bone: the index of the changed bone.)");
 }
 
 }  // namespace sinew::bindings

@@ -5,8 +5,7 @@
 
 #include "broadcast.h"
 #include "deform_arguments.h"
-#include "parameters.h"
-#include "sinew/twist_spread.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
 #include "stages.h"
 
 namespace sinew::bindings {
@@ -30,12 +29,12 @@ Timed<TwistSpread> make(const Binding& binding, const ArrayLike& twists, const A
         listed.push_back({row[0], row[1], row[2], row[3] != 0, as_points(first)[i], as_points(last)[i]});
     }
     const std::vector<Affine<float>> bones = checked_affines(rest_bones, "rest_bones");
-    const auto of_bones = one_for_each<std::int32_t>(parents, "parents", bones.size(), "int32");
+    const auto numbers = one_for_each<std::int32_t>(parents, "parents", bones.size(), "int32");
     const auto mask = one_for_each<float>(weights, "weights", binding.vertex_count(), "float32");
     const auto mixed = one_for_each<float>(mix, "mix", binding.vertex_count(), "float32");
-    return TwistSpread(
-        binding, {listed, bones, as_span(of_bones), checked_affine(bones_from_model, "bones_from_model"),
-                  as_span(mask), as_span(mixed)});
+    return TwistSpread(binding,
+                       {listed, bones, as_span(numbers), checked_affine(bones_from_model, "bones_from_model"),
+                        as_span(mask), as_span(mixed)});
 }
 
 std::vector<TwistChannels<float>> checked_channels(const OptionalArrayLike& channels, std::size_t count) {
@@ -61,7 +60,7 @@ TwistBlend checked_blend(const py::object& blend, const char* argument) {
 py::array_t<float> angles(const Timed<TwistSpread>& spread, const ArrayLike& bone_transforms,
                           const OptionalArrayLike& channels) {
     const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
-    const std::vector<float> found = spread.angles(bones, checked_channels(channels, spread.twist_count()));
+    const std::vector<float> found = spread.angles({bones}, checked_channels(channels, spread.twist_count()));
     return array_of(std::span(found));
 }
 
@@ -74,14 +73,12 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
                          const Threads& threads) {
     const auto given = checked_points(points, "points", spread.vertex_count());
     const std::vector<Affine<float>> bones = checked_bones(bone_transforms, spread.bone_count());
-    const auto of_bones = one_for_each<float>(amounts, "amounts", spread.twist_count(), "float32");
+    const auto factors = one_for_each<float>(amounts, "amounts", spread.twist_count(), "float32");
     const auto curved = one_for_each<float>(curves, "curves", spread.twist_count(), "float32");
     const auto told = checked_channels(channels, spread.twist_count());
     TwistSpreadOptions options;
-    const Parameter& parameter = parameter_of(TwistSpreadStage::kParameters, "amount");
-    options.amount =
-        static_cast<float>(checked_parameter(amount, parameter, "amount", "twist_spread.amount"));
-    options.amounts = as_span(of_bones);
+    options.amount = static_cast<float>(checked_option<TwistSpreadStage>(amount, "amount"));
+    options.amounts = as_span(factors);
     options.curves = as_span(curved);
     options.channels = told;
     options.blend = checked_blend(blend, "blend");
@@ -92,12 +89,14 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
 
 }  // namespace
 
-void bind_twist_spread(py::module_& m) {
-    py::class_<Timed<TwistSpread>>(
+void bind_stage(py::module_& m, TwistSpreadStage) {
+    auto type = stage_class<TwistSpread>(
         m, "TwistSpread",
         R"(The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
-bones do. Applied after Deformer.deform() and before all other stages.)")
-        .def(py::init(&make), "binding"_a, "twists"_a, "heads"_a, "tails"_a, "rest_bones"_a, py::kw_only(),
+bones do. Applied after Deformer.deform() and before all other stages.)",
+        "twists", [](const TwistSpread& spread) { return spread.twist_count(); });
+    def_bones(type);
+    type.def(py::init(&make), "binding"_a, "twists"_a, "heads"_a, "tails"_a, "rest_bones"_a, py::kw_only(),
              "parents"_a = py::none(), "bones_from_model"_a = py::none(), "weights"_a = py::none(),
              "mix"_a = py::none(),
              R"(binding: the mesh. Its memory is shared.
@@ -112,17 +111,7 @@ parents: None, or int32 [bones], -1 for none. Only twists beyond half a turn nee
 bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
 weights: None, or float32 [vertices], how much each vertex takes part, 0 to 1; clamped.
 mix: None, or float32 [vertices], the weights of Deformer's `mix`.)")
-        .def_property_readonly("vertex_count", &TwistSpread::vertex_count, kVertexCount)
-        .def_property_readonly("bone_count", &TwistSpread::bone_count, "How many bones a pose must have.")
         .def_property_readonly("twist_count", &TwistSpread::twist_count, "Number of twists.")
-        .def("__repr__",
-             [](const Timed<TwistSpread>& spread) {
-                 return "<sinew.TwistSpread: " + std::to_string(spread.vertex_count()) + " vertices, " +
-                        std::to_string(spread.twist_count()) + " twists>";
-             })
-        .def("set_rest_points", &set_rest_points<TwistSpread>, "rest_points"_a,
-             "bones_from_model"_a = py::none(),
-             "Sets other rest points, float32 [vertices, 3], or another space of the bones.")
         .def(
             "angles", &angles, "bone_transforms"_a, "channels"_a = py::none(),
             R"(The twists in a pose, float32 [twists], radians, as apply() spreads them by an amount of 1: faded from 150

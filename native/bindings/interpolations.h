@@ -86,4 +86,33 @@ std::vector<T> checked_times(const py::object& value, py::ssize_t keys) {
     return items_of<T>(input);
 }
 
+/// What the library returns, for an Output.
+template <class Transform>
+using Blend = Named<"Blended", Transform, bool>;
+
+/// Calls evaluate(keys, times, time) for each time in `at`.
+template <class T, class Key, class Evaluate>
+py::object along_keys(const py::object& keys, const py::object& times, const py::object& at,
+                      Evaluate evaluate) {
+    const auto input = checked_input<T, Key>(keys, "keys");
+    if (input.lead.size() != 1 || input.lead[0] == 0) {
+        fail("keys", "one axis of keys, at least one", describe(keys));
+    }
+    const std::vector<Key> items = items_of<Key>(input);
+    const std::vector<T> key_times = checked_times<T>(times, input.lead[0]);
+    const auto moments = checked_input<T, T>(at, "at");
+    return each_of<Blend<Key>>(moments.lead, [&](py::ssize_t i) -> Blend<Key> {
+        const auto result =
+            evaluate(std::span<const Key>(items), std::span<const T>(key_times), moments.data[i]);
+        return {result.transform, result.is_defined};
+    });
+}
+
+/// Whether the last axis of `keys` has length 3.
+inline bool is_of_points(const py::object& keys) {
+    if (!py::isinstance<py::array>(keys)) return false;
+    const auto array = py::reinterpret_borrow<py::array>(keys);
+    return array.ndim() > 0 && array.shape(array.ndim() - 1) == 3;
+}
+
 }  // namespace sinew::bindings

@@ -15,15 +15,15 @@
 
 #include "polygons.h"
 #include "scene.h"
-#include "sinew/bulge_limit.h"
-#include "sinew/delta_mush.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 #if SINEW_WITH_DDM
 #include "sinew/methods/ddm/direct_delta_mush.h"
 #endif
 #include "sinew/normals.h"
 #include "sinew/skinned_normals.h"
-#include "sinew/twist_spread.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
 
 #ifdef __GLIBC__
 #include <dlfcn.h>

@@ -5,10 +5,9 @@
 #include <utility>
 #include <vector>
 
-#include "sinew/interpolate/hermite.h"
 #include "sinew/interpolate/methods.h"
+#include "sinew/interpolate/spline.h"
 #include "sinew/skeleton/forward_kinematics.h"
-#include "sinew/skeleton/keyframes.h"
 #include "support.h"
 
 namespace sinew::test {
@@ -64,33 +63,11 @@ TYPED_TEST(Spline, sizes_that_do_not_fit_read_and_write_nothing) {
     for (const auto& [from, onto] : {std::pair(some, std::span(bones)), std::pair(all, std::span(three))}) {
         are_done.push_back(root_relative<Transform>(skeleton, mark, from, onto));
         are_done.push_back(update_branch<Transform>(skeleton, mark, from, 1, onto));
-        are_done.push_back(interpolate_keyframes<TypeParam, double>(skeleton, from, all, 0.5, onto));
-        are_done.push_back(
-            spline_keyframes<TypeParam, double>(skeleton, from, few(times).first(1), 0.5, onto));
-        are_done.push_back(
-            spline_keyframes_vector<Transform, double>(skeleton, from, few(times).first(1), 0.5, onto));
     }
     are_done.push_back(update_branch<Transform>(skeleton, mark, all, 4, bones));
-    are_done.push_back(interpolate_keyframes<TypeParam, double>(skeleton, all, some, 0.5, bones));
-    are_done.push_back(spline_keyframes<TypeParam, double>(skeleton, {}, {}, 0.5, bones));
     EXPECT_EQ(std::ranges::count(are_done, true), 0);
     for (const Transform& bone : bones) EXPECT_EQ(distance(to_affine(bone), to_affine(mark)), 0.0);
     EXPECT_TRUE(root_relative<Transform>(skeleton, mark, all, bones));
-}
-
-TEST(Hermite, sizes_that_do_not_fit_read_nothing) {
-    const std::vector<Vec3<double>> points(4, Vec3<double>(1.0));
-    const std::vector<DualQuat<double>> keys(4);
-    const std::vector<Twist<double>> velocities(4);
-    const std::vector<double> times{0.0, 1.0, 2.0, 3.0};
-    const auto few = [](const auto& all) { return std::span(all).first(2); };
-    EXPECT_EQ(hermite<double>(few(points), points, times, 2.5), Vec3<double>(0.0));
-    EXPECT_EQ(hermite<double>(points, few(points), times, 2.5), Vec3<double>(0.0));
-    EXPECT_EQ(hermite<double>(std::span<const Vec3<double>>(), {}, {}, 2.5), Vec3<double>(0.0));
-    EXPECT_FALSE(hermite<double>(few(keys), velocities, times, 2.5).is_defined);
-    EXPECT_FALSE(hermite<double>(keys, few(velocities), times, 2.5).is_defined);
-    EXPECT_FALSE(hermite<double>(std::span<const DualQuat<double>>(), {}, {}, 2.5).is_defined);
-    EXPECT_TRUE(hermite<double>(keys, velocities, times, 2.5).is_defined);
 }
 
 }  // namespace

@@ -63,7 +63,6 @@ def kept(make, method, probe):
     return call
 
 
-BONE_KEYS = np.stack([KEYS[:3], KEYS[2:]], axis=1)
 # Call, and arguments that it needs.
 CALLS = {
     "Binding": (lambda **given: skinned(sinew.Binding(**given)), SKIN),
@@ -130,15 +129,8 @@ CALLS = {
         on_skeleton("update_branch"),
         {"root_relative": POSED, "transforms": POSED[::-1], "bone": 1},
     ),
-    "between poses": (on_skeleton("interpolate"), {"a": KEYS[:2], "b": KEYS[2:4], "t": 0.5}),
-    "keyframes": (on_skeleton("spline"), {"keyframes": BONE_KEYS, "times": [0, 1, 2], "time": 0.5}),
-    "keyframes by components": (
-        on_skeleton("spline_vector"),
-        {"keyframes": BONE_KEYS, "times": [0, 1, 2], "time": 0.5},
-    ),
     "catmull_rom": (spline.catmull_rom, SPLINE),
     "catmull_rom_vector": (spline.catmull_rom_vector, SPLINE),
-    "hermite": (spline.hermite, {"tangents": KEYS[:, 1:4], **SPLINE, "keys": KEYS[:, :3]}),
     "between": (interpolate.between, {"a": KEYS, "b": KEYS[::-1], "t": 0.5}),
     "blend": (interpolate.blend, {"transforms": KEYS, "weights": np.ones(5)}),
 }
@@ -183,8 +175,6 @@ MORE = {
     "moments": {"exact": True, "threads": 2, "gives_way": False},
     "root_relative": {"root": POSED[1]},
     "update_branch": {"root": POSED[1]},
-    "between poses": {"method": "sclerp"},
-    "keyframes": {"method": "dlb"},
     "catmull_rom": {"method": "sclerp"},
     "between": {"method": "dlb"},
     "blend": {"method": "sclerp", "signs": "as_given"},

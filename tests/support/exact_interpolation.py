@@ -492,72 +492,6 @@ def catmull_rom_vector(_name, function):
                 agree_motions(got, name, want, size, signed=True)
 
 
-@functools.cache
-def hermite_terms():
-    """Indices [COUNT, 2], the part of the interval and its length, numbers [COUNT]."""
-    _cases, times, at = spline_cases()
-    found = [interval(times[curve], moment) for curve in range(CURVES) for moment in at[curve]]
-    keys, after, part, span = (np.array(column) for column in zip(*found, strict=True))
-    first = np.repeat(np.arange(CURVES) * KEYS, TIMES)
-    return np.stack([first + keys, first + after], axis=1), part, span
-
-
-def hermite(_name, function):
-    _hermite_of_points(function)
-    _hermite_of_motions(function)
-
-
-def _hermite_of_points(function):
-    ends, u, span = hermite_terms()
-    keys, tangents = points(105)[: CURVES * KEYS], points(106)[: CURVES * KEYS]
-    p, q = exact(keys[ends[:, 0]]), exact(keys[ends[:, 1]])
-    leave, arrive = exact(tangents[ends[:, 0]]) * span, exact(tangents[ends[:, 1]]) * span
-    # Smith 2013, section 2.3.2, in powers of u.
-    want = rounded(
-        (2 * u**3 - 3 * u**2 + 1) * p
-        + (u**3 - 2 * u**2 + u) * leave
-        + (3 * u**2 - 2 * u**3) * q
-        + (u**3 - u**2) * arrive
-    )
-    size = largest(keys[ends]) + largest(tangents[ends]) * span.astype(np.float64)
-    for dtype in FLOATS:
-        got, is_defined = by_curve(function, dtype, keys, tangents)
-        assert is_defined.all()
-        agree(got, want, size)
-
-
-def _hermite_of_motions(function):
-    cases = spline_cases()[0]
-    ends, u, span = hermite_terms()
-    rng = np.random.default_rng(107)
-    count = CURVES * KEYS
-    tangents = np.column_stack([0.2 * rng.normal(size=(count, 3)), translations(rng, count)])
-    third = span / 3
-
-    def velocity(end, factor):
-        v = exact(tangents[ends[:, end]])
-        return e.from_twist(v[:3] * factor, v[3:] * factor)
-
-    first, last = cases.exact.take(ends[:, 0]), cases.exact.take(ends[:, 1])
-    points_of_curve = [
-        first,
-        e.compose(first, velocity(0, third)),
-        e.compose(last, velocity(1, -third)),
-        last,
-    ]
-    while len(points_of_curve) > 1:
-        points_of_curve = [
-            e.compose(a, e.power(e.compose(e.inverse(a), b), u))
-            for a, b in itertools.pairwise(points_of_curve)
-        ]
-    want = in_layout(points_of_curve[0], "dual_quat")
-    size = largest(cases.size[ends]) + largest(tangents[ends][..., 3:]) * span.astype(np.float64)
-    for dtype in FLOATS:
-        got, is_defined = by_curve(function, dtype, cases.dual_quat, tangents)
-        assert is_defined.all()
-        agree_motions(got, "dual_quat", want, size)
-
-
 # --- Skeletons
 
 
@@ -623,43 +557,6 @@ def _is_below(parents, bone):
     return bone == 2
 
 
-def skeleton_keys(name, dtype):
-    """A skeleton, keys [KEYS, BONES, ..] in this layout, their times, and times to evaluate."""
-    keys = motions(109).of(name, dtype)[: KEYS * BONES]
-    keys = keys.reshape(KEYS, BONES, *keys.shape[1:])
-    times = np.array([0, 1, 3, 3, 4, 7], dtype)
-    return sinew.Skeleton(skeletons()[0]), keys, times, np.array([-1, 0, 0.25, 2, 3, 3.5, 6.75, 7, 9], dtype)
-
-
-# Each bone of a skeleton gets the bits of the function that is compared with 50 digits above.
-
-
-def skeleton_interpolate(_name, _function):
-    for method, name in LAYOUT_OF.items():
-        for dtype in FLOATS:
-            skeleton, keys, _times, at = skeleton_keys(name, dtype)
-            bones, defined = skeleton.interpolate(keys[0], keys[1], at, method)
-            want = sinew.interpolate.between(keys[0], keys[1], at[:, None], method)
-            np.testing.assert_array_equal(bones, want.transforms)
-            np.testing.assert_array_equal(defined, want.is_defined.all(axis=1))
-
-
-def agree_by_bone(result, of_bone):
-    for bone in range(BONES):
-        np.testing.assert_array_equal(result[0][:, bone], of_bone[bone].transforms)
-    np.testing.assert_array_equal(result[1], np.all([each.is_defined for each in of_bone], axis=0))
-
-
-def skeleton_spline(_name, _function):
-    for method, name in LAYOUT_OF.items():
-        for dtype in FLOATS:
-            skeleton, keys, *when = skeleton_keys(name, dtype)
-            want = [sinew.spline.catmull_rom(keys[:, bone], *when, method) for bone in range(BONES)]
-            agree_by_bone(skeleton.spline(keys, *when, method), want)
-            want = [sinew.spline.catmull_rom_vector(keys[:, bone], *when) for bone in range(BONES)]
-            agree_by_bone(skeleton.spline_vector(keys, *when), want)
-
-
 BLENDS = {
     "matrix_log": blend_of_logarithms,
     **{method: blend_of_sums(method) for method in ("matrix_linear", "matrix_polar", "qv_nlerp", "dlb")},
@@ -672,10 +569,6 @@ CHECKS = {
     **{f"interpolate.blend.{method}": BLENDS[method] for method in LAYOUT_OF},
     **{f"spline.catmull_rom.{method}": catmull_rom(method) for method in LAYOUT_OF},
     "spline.catmull_rom_vector": catmull_rom_vector,
-    "spline.hermite": hermite,
     "Skeleton.root_relative": root_relative_and_update_branch,
     "Skeleton.update_branch": root_relative_and_update_branch,
-    "Skeleton.interpolate": skeleton_interpolate,
-    "Skeleton.spline": skeleton_spline,
-    "Skeleton.spline_vector": skeleton_spline,
 }

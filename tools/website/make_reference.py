@@ -128,14 +128,12 @@ def _options(parser: argparse.ArgumentParser) -> str:
 def python_api() -> str:
     """What `sinew` and its modules name in `__all__`, from their docstrings and types."""
     package = parsed("__init__.py")
-    known = _definitions(parsed("_native/__init__.pyi"))
+    native = parsed("_native/__init__.pyi")
+    known = _definitions(native)
     pages = ["# Python", said(_docstring(package))]
-    modules = []
-    for name in exported(package):
-        if name in known:
-            pages += _described(name, known[name], "##")
-        elif (PACKAGE / f"{name}.py").exists():
-            modules.append(name)
+    for name in exported(native):
+        pages += _described(name, known[name], "##")
+    modules = sorted(path.stem for path in PACKAGE.glob("[a-z]*.py"))
     for name in modules:
         pages += _module(name)
     pages += ["## Results", "Named tuples that functions of these modules return."]
@@ -157,7 +155,7 @@ def _docstring(node: ast.Module | ast.ClassDef | ast.FunctionDef) -> str:
 def exported(module: ast.Module) -> list[str]:
     """`__all__`, or nothing."""
     for node in module.body:
-        if isinstance(node, ast.Assign) and ast.unparse(node.targets[0]) == "__all__":
+        if isinstance(node, (ast.Assign, ast.AnnAssign)) and ast.unparse(node).startswith("__all__"):
             return ast.literal_eval(node.value)
     return []
 
@@ -285,15 +283,16 @@ def cpp_api() -> str:
 
 
 def public_headers() -> list[str]:
-    """Those that are installed, but for the definitions of methods and stages."""
+    """Those that are installed, but for the definitions of methods."""
     described = (HEADERS / "CMakeLists.txt").read_text(encoding="utf-8")
     listed = re.search(r"list\(APPEND headers\s+([^)]*)\)", described)
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
     top = sorted({path.name for path in HEADERS.glob("*.h")} - {"sinew.h", "deformer_state.h"})
     folders = ("transform", "interpolate", "skeleton")
-    others = [path.relative_to(HEADERS).as_posix() for f in folders for path in (HEADERS / f).glob("*.h")]
-    return [*top, *listed[1].split(), *sorted(others)]
+    others = [path for f in folders for path in (HEADERS / f).glob("*.h")]
+    others += [path for path in HEADERS.glob("stages/*/*.h") if path.stem == path.parent.name]
+    return [*top, *listed[1].split(), *sorted(path.relative_to(HEADERS).as_posix() for path in others)]
 
 
 def declarations(header: str) -> str:

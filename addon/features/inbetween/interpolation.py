@@ -151,9 +151,11 @@ def on_spline(keys: Poses, times: np.ndarray, at: float, method: interpolate.Met
     # translations.
     translations = np.zeros_like(keys.rigid) + quat_vec.identity()
     translations[..., 4:] = keys.scale
-    roots = sinew.Skeleton(np.full(translations.shape[1], -1, dtype=np.int32))
-    scale = roots.spline(translations, times, at, "qv_nlerp")[0][:, 4:]
-    return inbetweens(blended, scale, method)
+    scale = [
+        spline.catmull_rom(np.ascontiguousarray(bone), times, at, "qv_nlerp").transforms[4:]
+        for bone in np.swapaxes(translations, 0, 1)
+    ]
+    return inbetweens(blended, np.array(scale).reshape(-1, 3), method)
 
 
 def progress(now: np.ndarray, a: np.ndarray, b: np.ndarray) -> np.ndarray:

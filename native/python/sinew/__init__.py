@@ -21,57 +21,7 @@ that is no str.
 """
 
 from . import affine, dual, dual_quat, interpolate, quat, quat_vec, spline
-from ._native import (
-    Binding,
-    BulgeLimit,
-    Deformer,
-    DeltaMush,
-    Lock,
-    Method,
-    Normals,
-    Parameter,
-    Precomputation,
-    Skeleton,
-    SkinnedNormals,
-    Stage,
-    TwistSpread,
-    __version__,
-    centres_of_rotation,
-    direct_delta_mush,
-    keep_thread_state,
-    methods,
-    stages,
-    thread_id,
-    weights_in_memory,
-)
+from ._native import *
+from ._native import __version__ as __version__
 
-__all__ = [
-    "Binding",
-    "BulgeLimit",
-    "Deformer",
-    "DeltaMush",
-    "Lock",
-    "Method",
-    "Normals",
-    "Parameter",
-    "Precomputation",
-    "Skeleton",
-    "SkinnedNormals",
-    "Stage",
-    "TwistSpread",
-    "__version__",
-    "affine",
-    "centres_of_rotation",
-    "direct_delta_mush",
-    "dual",
-    "dual_quat",
-    "interpolate",
-    "keep_thread_state",
-    "methods",
-    "quat",
-    "quat_vec",
-    "spline",
-    "stages",
-    "thread_id",
-    "weights_in_memory",
-]
+__all__ = [name for name in dir() if not name.startswith("_")]

@@ -2,7 +2,7 @@
 """Splines through transforms or points at given times (Catmull and Rom 1974; Smith 2013, section 2.3.2).
 
 keys   [n, 4, 4], [n, 3, 4], [n, 7] or [n, 8], n >= 1, rotations of unit length; or [n, 3], points, for
-       catmull_rom_vector() and hermite()
+       catmull_rom_vector()
 times  [n], non-decreasing. The curve is constant before the first time and after the last. Keys of equal
        time are a cut: the curve ends at the first of them and starts again at the last
 at     [..] or a number: the times at which to evaluate the curve
@@ -15,7 +15,7 @@ Not defined if keys in use are 180 degrees apart (quaternions; the signs as give
 blend is not defined (sinew.interpolate).
 """
 
-from ._native.spline import catmull_rom, catmull_rom_vector, hermite
+from ._native.spline import catmull_rom, catmull_rom_vector
 from ._types import Blended
 
-__all__ = ["Blended", "catmull_rom", "catmull_rom_vector", "hermite"]
+__all__ = ["Blended", "catmull_rom", "catmull_rom_vector"]

@@ -35,10 +35,11 @@ HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
 
 /// Computes the displacement of `rest` by the scale of `bone`. Returns false if the bone has no scale.
 template <class D>
-HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest, Points<D>& by) {
+HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest,
+                       Points<D>& added) {
     const auto index = static_cast<std::size_t>(bone);
     if (!palette.any_scale || palette.has_scale[index] == 0) return false;
-    by = displacement(d, palette.scales[kDisplacementRows * index].value.data(), rest);
+    added = displacement(d, palette.scales[kDisplacementRows * index].value.data(), rest);
     return true;
 }
 
@@ -126,13 +127,13 @@ HWY_INLINE Quats rotations(const Motions& m) {
 ///
 /// Rows  write_row(rotation, translation, row) writes the numbers of a rigid motion
 template <class Rows>
-void rigid_bone_rows(const Bones& of, Palette& palette) {
+void rigid_bone_rows(const Bones& all, Palette& palette) {
     const BoneTag d;
-    const std::span<const std::int32_t> used = of.used;
+    const std::span<const std::int32_t> used = all.used;
     constexpr std::size_t kMax = hn::MaxLanes(BoneTag());
     for (std::size_t i = 0; i < used.size(); i += kMax) {
         const auto bones = used.subspan(i, std::min(kMax, used.size() - i));
-        const Motions motions = load_motions(of.pose.posed_from_rest, bones);
+        const Motions motions = load_motions(all.pose.posed_from_rest, bones);
         constexpr std::size_t kNumbers = Rows::kNumbers;
         BoneVec row[kNumbers];
         Rows::write_row(rotations(motions), motions.translation, row);
@@ -162,9 +163,9 @@ struct CentreRows {
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D, kNumbers>& sum) {
-        Points<D> by;
-        if (!scaled(d, palette, bone, rest, by)) return;
-        const Points<D> rotated = rotated_by(d, row_of<kNumbers>(palette, bone), by);
+        Points<D> added;
+        if (!scaled(d, palette, bone, rest, added)) return;
+        const Points<D> rotated = rotated_by(d, row_of<kNumbers>(palette, bone), added);
         sum.value[7] = hn::MulAdd(weight, rotated.x, sum.value[7]);
         sum.value[11] = hn::MulAdd(weight, rotated.y, sum.value[11]);
         sum.value[15] = hn::MulAdd(weight, rotated.z, sum.value[15]);

@@ -22,12 +22,12 @@ struct alignas(16) Float4 {
 /// to what the transform adds to it.
 inline constexpr std::size_t kDisplacementRows = 3;
 
-/// A vertex's bones are summed in one of two ways, which differ only by rounding.
+/// A vertex's bones are summed as base + the sum of weight (bone - base).
 ///
-/// Usually the sum is relative: the first bone is taken whole, and the differences of the others from it are added by
-/// their weights, which takes fewer operations. The rounding error is then that of the first bone, whatever its weight.
-/// If the first bone is more than kMaxSizeRatio times as large as another, such as a bone that is far away, the sum is
-/// absolute instead: every bone is added by its weight. The choice depends only on the bones.
+/// Usually the base is the first bone, which then takes no weight: the fewest operations. The rounding error is that of
+/// the first bone, whatever its weight. If the first bone is more than kMaxSizeRatio times as large as another, such
+/// as a bone that is far away, the base is 0 instead, and the first bone is one of the others: an absolute sum. Both
+/// differ only by rounding. The choice depends only on the bones.
 inline constexpr float kMaxSizeRatio = 4.0f;
 
 /// Bones smaller than this count as equally large: their rounding errors are far below any mesh's precision.

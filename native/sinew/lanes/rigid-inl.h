@@ -66,8 +66,8 @@ struct Blend {
     Vec<D> quaternion[4];
 };
 
-/// The base of rows whose sum is absolute.
-inline constexpr float kNoBase[kMaxRow] = {};
+/// The base of rows whose sum is absolute: the row before the first, of weight 1.
+alignas(64) inline constexpr float kNoBase[kMaxRow] = {};
 
 /// The dot product of a quaternion [4] with those of the lanes. Products and sums are rounded one by one, in the order
 /// of blend_vertex(), because both must decide ties alike.
@@ -90,9 +90,9 @@ HWY_INLINE Vec<D> add_to_blend(D d, const float* base, const float* row, Vec<D> 
     for (std::size_t i = 0; i < Rigid::kNumbers; ++i) {
         const Vec<D> difference = hn::Set(d, row[i] - base[i]);
         const Vec<D> negated = hn::Set(d, -row[i] - base[i]);
-        const Vec<D> by =
+        const Vec<D> term =
             i < 4 * Rigid::kSignedFloat4s ? hn::IfThenElse(away, negated, difference) : difference;
-        blend.sum.value[i] = hn::MulAdd(weight, by, blend.sum.value[i]);
+        blend.sum.value[i] = hn::MulAdd(weight, term, blend.sum.value[i]);
     }
     for (std::size_t i = 0; i < 4; ++i)
         quaternion[i] = hn::MulAdd(signed_weight, hn::Set(d, row[i]), quaternion[i]);
@@ -203,10 +203,10 @@ float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_
 
 #endif
 
-/// Copies the first bone of a set to `rows`, and the differences of the others from it or, if kAbsolute, the others
-/// themselves, each with the sign with which it is added. Returns false if a sign depends on the weights, or if a
-/// bone has scale and therefore depends on the vertex.
-template <class Rigid, bool kAbsolute>
+/// Copies the first bone of a set to `rows`, and the others or, if kDifferences, their differences from it, each with
+/// the sign with which it is added. Returns false if a sign depends on the weights, or if a bone has scale and
+/// therefore depends on the vertex.
+template <class Rigid, bool kDifferences>
 HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones, std::size_t count,
                               float* rows) {
     if (count > kMaxResolved) return false;
@@ -216,33 +216,26 @@ HWY_INLINE bool resolve_signs(const Palette& palette, const std::int32_t* bones,
         }
     }
     // Within 45 degrees of the first, all are within 90 degrees of each other.
-    const float least = copy_aligned<Rigid, !kAbsolute>(palette, bones, count, rows);
+    const float least = copy_aligned<Rigid, kDifferences>(palette, bones, count, rows);
     if (Rigid::kSignedFloat4s == 0 || least > kCosine45 || palette.keeps_signs) return true;
-    if (!kAbsolute) copy_aligned<Rigid, false>(palette, bones, count, rows);
+    if (kDifferences) copy_aligned<Rigid, false>(palette, bones, count, rows);
     if (!signs_agree(rows, Rigid::kNumbers, count)) return false;
-    if (!kAbsolute) subtract_first<Rigid::kNumbers>(rows, count);
+    if (kDifferences) subtract_first<Rigid::kNumbers>(rows, count);
     return true;
 }
 
 /// Blends numbers [begin, begin + kSize) of a set's rows for kVectors neighbouring vectors, with resolved signs. With
 /// a fixed kCount the loop is unrolled.
 ///
-/// first_weight  of the first influence, only read if kAbsolute
-/// weights       of the second influence and those after it
-/// sums          [kVectors][kSize]
-template <std::size_t kNumbers, std::size_t kCount, bool kAbsolute, std::size_t kSize, std::size_t kVectors,
-          class D>
+/// count    of the rows
+/// weights  of the second row and those after it
+/// sums     [kVectors][kSize]
+template <std::size_t kNumbers, std::size_t kCount, std::size_t kSize, std::size_t kVectors, class D>
 HWY_INLINE void blend_numbers(D d, const float* rows, std::size_t begin, std::size_t count,
-                              const float* first_weight, const float* weights, Vec<D>* sums) {
+                              const float* weights, Vec<D>* sums) {
     const std::size_t step = hn::Lanes(d);
     for (std::size_t v = 0; v < kVectors; ++v) {
         for (std::size_t i = 0; i < kSize; ++i) sums[kSize * v + i] = hn::Set(d, rows[begin + i]);
-        if constexpr (kAbsolute) {
-            const Vec<D> weight = hn::Load(d, first_weight + v * step);
-            for (std::size_t i = 0; i < kSize; ++i) {
-                sums[kSize * v + i] = hn::Mul(weight, sums[kSize * v + i]);
-            }
-        }
     }
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
         const float* const row = rows + kNumbers * k + begin;
@@ -261,11 +254,10 @@ HWY_INLINE void blend_numbers(D d, const float* rows, std::size_t begin, std::si
 }
 
 /// Blends the rows of a set of bones for one vector. Arguments are those of blend_numbers().
-template <std::size_t kNumbers, std::size_t kCount, bool kAbsolute, class D>
-HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* first_weight,
-                                       const float* weights) {
+template <std::size_t kNumbers, std::size_t kCount, class D>
+HWY_INLINE Sum<D, kNumbers> blend_rows(D d, const float* rows, std::size_t count, const float* weights) {
     Sum<D, kNumbers> sum;
-    blend_numbers<kNumbers, kCount, kAbsolute, kRow, 1>(d, rows, 0, count, first_weight, weights, sum.value);
+    blend_numbers<kNumbers, kCount, kRow, 1>(d, rows, 0, count, weights, sum.value);
     for (std::size_t i = kRow; i < kNumbers; ++i) sum.value[i] = hn::Set(d, rows[i]);
     return sum;
 }
@@ -276,22 +268,20 @@ inline constexpr std::size_t kVectorsAtOnce = hn::MaxLanes(Full()) < kLanes ? 2 
 
 /// Blends CentreRows of a set of bones for kVectors neighbouring vectors, and writes their motions at the points
 /// `p`. Other arguments are those of blend_numbers().
-template <std::size_t kVectors, std::size_t kCount, bool kAbsolute, class D>
-HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const float* first_weights,
-                              const float* weights, const Points<D>* p, Motion<D>* motions) {
+template <std::size_t kVectors, std::size_t kCount, class D>
+HWY_INLINE void blend_motions(D d, const float* rows, std::size_t count, const float* weights,
+                              const Points<D>* p, Motion<D>* motions) {
     constexpr std::size_t kNumbers = CentreRows::kNumbers;
     // As many numbers at once as there are registers for their sums.
     if constexpr (kVectors == 1) {
         Sum<D, kNumbers> sum;
         for (std::size_t i = 0; i < kNumbers; i += kRow) {
-            blend_numbers<kNumbers, kCount, kAbsolute, kRow, 1>(d, rows, i, count, first_weights, weights,
-                                                                sum.value + i);
+            blend_numbers<kNumbers, kCount, kRow, 1>(d, rows, i, count, weights, sum.value + i);
         }
         motions[0] = motion_at(sum, p[0]);
     } else {
         const auto blend = [&](std::size_t begin, Vec<D>* sums) HWY_ATTR {
-            blend_numbers<kNumbers, kCount, kAbsolute, 4, kVectors>(d, rows, begin, count, first_weights,
-                                                                    weights, sums);
+            blend_numbers<kNumbers, kCount, 4, kVectors>(d, rows, begin, count, weights, sums);
         };
         const auto blend_axis = [&](std::size_t begin, Vec<D> Points<D>::*axis) HWY_ATTR {
             Vec<D> sums[4 * kVectors];
@@ -317,18 +307,16 @@ HWY_INLINE Sum<D, Rigid::kNumbers> blend_bones(D d, const Palette& palette, cons
                                                std::size_t count, bool is_absolute, const float* first_weight,
                                                const float* weights, const Points<D>& rest) {
     constexpr std::size_t kNumbers = Rigid::kNumbers;
+    const float* const base = is_absolute ? kNoBase : row_of<kNumbers>(palette, bones[0]);
     const Vec<D> first = hn::Load(d, first_weight);
-    const float* const row = row_of<kNumbers>(palette, bones[0]);
-    const float* const base = is_absolute ? kNoBase : row;
     Blend<D, kNumbers> blend;
     for (std::size_t i = 0; i < kNumbers; ++i) {
-        const Vec<D> number = hn::Set(d, row[i]);
-        blend.sum.value[i] = is_absolute ? hn::Mul(first, number) : number;
-        if (i < 4) blend.quaternion[i] = hn::Mul(first, number);
+        blend.sum.value[i] = hn::Set(d, base[i]);
+        if (i < 4) blend.quaternion[i] = hn::Mul(first, blend.sum.value[i]);
     }
-    Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
-    for (std::size_t k = 1; k < count; ++k) {
-        const Vec<D> weight = hn::Load(d, weights + kLanes * (k - 1));
+    if (!is_absolute) Rigid::add_scale(d, palette, bones[0], first, first, rest, blend.sum);
+    for (std::size_t k = is_absolute ? 0 : 1; k < count; ++k) {
+        const Vec<D> weight = k == 0 ? first : hn::Load(d, weights + kLanes * (k - 1));
         const Vec<D> signed_weight = add_to_blend<Rigid>(d, base, row_of<kNumbers>(palette, bones[k]), weight,
                                                          palette.keeps_signs, blend);
         Rigid::add_scale(d, palette, bones[k], weight, signed_weight, rest, blend.sum);
@@ -358,12 +346,13 @@ HWY_INLINE void finish_and_store(D d, const MeshPointers& pointers, const Spaces
 }
 
 /// Deforms lanes [lane, lane + kVectors * N) of a block with resolved signs.
-template <class Rigid, std::size_t kVectors, std::size_t kCount, bool kAbsolute>
-HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
-                               std::size_t b, std::size_t lane, const float* bone_rows, std::size_t count) {
+///
+/// weights  of these lanes, of the second row and those after it
+template <class Rigid, std::size_t kVectors, std::size_t kCount>
+HWY_INLINE void deform_vectors(const MeshPointers& pointers, const Spaces& spaces, std::size_t b,
+                               std::size_t lane, const float* bone_rows, std::size_t count,
+                               const float* weights) {
     const Full d;
-    const float* const first_weights = kAbsolute ? first_weights_of(frame, b) + lane : nullptr;
-    const float* const weights = weights_of(pointers, b) + lane;
     if constexpr (CentreKernel<Rigid>) {
         Points<Full> rest[kVectors];
         Points<Full> centres[kVectors];
@@ -373,38 +362,47 @@ HWY_INLINE void deform_vectors(const Frame& frame, const MeshPointers& pointers,
             rest[v] = load_rest(d, pointers, spaces, b, lane + v * step);
             centres[v] = Rigid::centre(d, pointers, spaces, b, lane + v * step, rest[v]);
         }
-        blend_motions<kVectors, kCount, kAbsolute>(d, bone_rows, count, first_weights, weights, centres,
-                                                   motions);
+        blend_motions<kVectors, kCount>(d, bone_rows, count, weights, centres, motions);
         for (std::size_t v = 0; v < kVectors; ++v) {
             store_in_model(d, pointers, spaces, b, lane + v * step,
                            Rigid::finish(d, motions[v], centres[v], rest[v]));
         }
     } else {
-        const auto sum =
-            blend_rows<Rigid::kNumbers, kCount, kAbsolute>(d, bone_rows, count, first_weights, weights);
+        const auto sum = blend_rows<Rigid::kNumbers, kCount>(d, bone_rows, count, weights);
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
     }
 }
 
 /// Deforms blocks [begin, end) with the same bones, whose signs are resolved.
 ///
-/// kCount  their influences, or 0 for any number
-template <class Rigid, std::size_t kCount, bool kAbsolute = false>
-void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end, const float* bone_rows) {
+/// kCount       the number of rows, or 0 for any number
+/// is_absolute  whether a row of weight 1 precedes those of the bones; only if kCount is 0
+///
+/// Not inlined, so that the loops of each count have all registers.
+template <class Rigid, std::size_t kCount>
+HWY_NOINLINE void deform_resolved(const Frame& frame, std::size_t begin, std::size_t end,
+                                  const float* bone_rows, bool is_absolute = false) {
     const Full d;
     constexpr std::size_t kVectors = CentreKernel<Rigid> ? kVectorsAtOnce : 1;
     const MeshPointers pointers = pointers_of(frame);
     const Spaces spaces = frame.spaces;
     const std::size_t influences = pointers.blocks[begin].influences;
+    const std::size_t count = influences + (is_absolute ? 1 : 0);
+    alignas(64) float all_weights[kCount == 0 ? kMaxResolved * kLanes : 1];
     for (std::size_t b = begin; b < end; ++b) {
+        const float* weights = weights_of(pointers, b);
+        if (kCount == 0 && is_absolute) {
+            std::copy_n(first_weights_of(frame, b), kLanes, all_weights);
+            std::copy_n(weights, kLanes * (influences - 1), all_weights + kLanes);
+            weights = all_weights;
+        }
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
             if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
-                deform_vectors<Rigid, 1, kCount, kAbsolute>(frame, pointers, spaces, b, lane, bone_rows,
-                                                            influences);
+                deform_vectors<Rigid, 1, kCount>(pointers, spaces, b, lane, bone_rows, count, weights + lane);
             } else {
-                deform_vectors<Rigid, kVectors, kCount, kAbsolute>(frame, pointers, spaces, b, lane,
-                                                                   bone_rows, influences);
+                deform_vectors<Rigid, kVectors, kCount>(pointers, spaces, b, lane, bone_rows, count,
+                                                        weights + lane);
             }
         }
     }
@@ -433,11 +431,14 @@ void deform_unresolved(const Frame& frame, std::size_t begin, std::size_t end, b
 /// Deforms blocks [begin, end) with the same bones, whose sum is absolute.
 template <class Rigid>
 HWY_NOINLINE void deform_absolute_set(const Frame& frame, std::size_t begin, std::size_t end) {
-    alignas(64) float rows[kMaxResolved * Rigid::kNumbers];
+    constexpr std::size_t kNumbers = Rigid::kNumbers;
+    alignas(64) float rows[(1 + kMaxResolved) * kNumbers];
     const Block& block = frame.mesh->blocks[begin];
     const std::int32_t* const bones = frame.bones + block.first_bone;
-    if (resolve_signs<Rigid, true>(*frame.palette, bones, block.influences, rows)) {
-        deform_resolved<Rigid, 0, true>(frame, begin, end, rows);
+    if (resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows + kNumbers)) {
+        std::copy_n(rows + kNumbers, kNumbers, rows);
+        std::fill_n(rows, CentreKernel<Rigid> ? kNumbers : kRow, 0.0f);
+        deform_resolved<Rigid, 0>(frame, begin, end, rows, true);
     } else {
         deform_unresolved<Rigid>(frame, begin, end, true);
     }
@@ -451,7 +452,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const std::int32_t* const bones = frame.bones + block.first_bone;
     if (is_summed_absolutely(*frame.palette, bones, block.influences))
         return deform_absolute_set<Rigid>(frame, begin, end);
-    if (!resolve_signs<Rigid, false>(*frame.palette, bones, block.influences, rows)) {
+    if (!resolve_signs<Rigid, true>(*frame.palette, bones, block.influences, rows)) {
         return deform_unresolved<Rigid>(frame, begin, end, false);
     }
     switch (block.influences) {
@@ -489,7 +490,7 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
 ///
 /// weights  of each influence, kLanes apart
 /// sums     receives the sum's Float4s, 4 * kLanes apart
-template <class Rigid, bool kAbsolute, bool kKeepsSigns>
+template <class Rigid, bool kKeepsSigns>
 HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, std::size_t count,
                              const float* weights, float* sums) {
     const Four d;
@@ -497,14 +498,12 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
     const auto row_at = [&](std::size_t k) {
         return &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])];
     };
-    const Float4* const first = row_at(0);
+    const bool is_absolute = is_summed_absolutely(palette, bones, count);
+    const float* const base = is_absolute ? kNoBase : row_at(0)->value.data();
     V4 sum[kRowFloat4s<Rigid>];
-    for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, first[q].value.data());
+    for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) sum[q] = hn::Load(d, base + 4 * q);
     V4 quaternions = hn::Mul(hn::Set(d, weights[0]), sum[0]);
-    if (kAbsolute) {
-        for (V4& quad : sum) quad = hn::Mul(hn::Set(d, weights[0]), quad);
-    }
-    for (std::size_t k = 1; k < count; ++k) {
+    for (std::size_t k = is_absolute ? 0 : 1; k < count; ++k) {
         const Float4* const row = row_at(k);
         const V4 weight = hn::Set(d, weights[kLanes * k]);
         const V4 quaternion = hn::Load(d, row->value.data());
@@ -514,21 +513,13 @@ HWY_INLINE void blend_vertex(const Palette& palette, const std::int32_t* bones, 
             away = hn::And(hn::SignBit(d), hn::VecFromMask(d, below));
         }
         for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) {
-            V4 by = hn::Load(d, row[q].value.data());
-            if (q < Rigid::kSignedFloat4s) by = hn::Xor(by, away);
-            if (!kAbsolute) by = hn::Sub(by, hn::Load(d, first[q].value.data()));
-            sum[q] = hn::MulAdd(weight, by, sum[q]);
+            V4 term = hn::Load(d, row[q].value.data());
+            if (q < Rigid::kSignedFloat4s) term = hn::Xor(term, away);
+            sum[q] = hn::MulAdd(weight, hn::Sub(term, hn::Load(d, base + 4 * q)), sum[q]);
         }
         quaternions = hn::MulAdd(hn::Xor(weight, away), quaternion, quaternions);
     }
     for (std::size_t q = 0; q < kRowFloat4s<Rigid>; ++q) hn::Store(sum[q], d, sums + 4 * kLanes * q);
-}
-
-/// Not inlined, so that its registers do not burden the usual case.
-template <class Rigid, bool kKeepsSigns>
-HWY_NOINLINE void blend_vertex_absolutely(const Palette& palette, const std::int32_t* bones,
-                                          std::size_t count, const float* weights, float* sums) {
-    blend_vertex<Rigid, true, kKeepsSigns>(palette, bones, count, weights, sums);
 }
 
 /// Deforms a block whose vertices have own bones. The sums of all vertices are transposed into lanes.
@@ -542,13 +533,8 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
     const Palette palette = *frame.palette;
     alignas(64) float sums[kRowFloat4s<Rigid>][4 * kLanes];
     for (std::size_t lane = 0; lane < kLanes; ++lane, bones += block.influences) {
-        const float* const weights = weights_of_block + lane;
-        float* const to = sums[0] + 4 * lane;
-        if (is_summed_absolutely(palette, bones, block.influences)) {
-            blend_vertex_absolutely<Rigid, kKeepsSigns>(palette, bones, block.influences, weights, to);
-        } else {
-            blend_vertex<Rigid, false, kKeepsSigns>(palette, bones, block.influences, weights, to);
-        }
+        blend_vertex<Rigid, kKeepsSigns>(palette, bones, block.influences, weights_of_block + lane,
+                                         sums[0] + 4 * lane);
     }
     const Full d;
     for (std::size_t lane = 0; lane < block.vertices; lane += hn::Lanes(d)) {

@@ -70,12 +70,6 @@ bool is_space(const Affine<float>& bones_from_model) noexcept {
     return is_finite(bones_from_model) && glm::determinant(Mat3<double>(bones_from_model.linear)) != 0.0;
 }
 
-Status status_of_rest(std::span<const Vec3<float>> points, std::size_t count,
-                      const Affine<float>& bones_from_model) noexcept {
-    const Status status = status_of_points(points, count);
-    return status == Status::ok && !is_space(bones_from_model) ? Status::not_finite : status;
-}
-
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count) {
     if (triangles.size() % 3 != 0) fail("triangles", "three corners each", std::to_string(triangles.size()));
     for (std::size_t i = 0; i < triangles.size(); ++i) {

@@ -41,11 +41,6 @@ SINEW_EXPORT void check_space(const Affine<float>& bones_from_model);
 /// Whether check_space() does not throw.
 [[nodiscard]] bool is_space(const Affine<float>& bones_from_model) noexcept;
 
-/// What keeps a stage from these rest points: that they are not `count`, or not finite, or that the transform has no
-/// inverse.
-Status status_of_rest(std::span<const Vec3<float>> points, std::size_t count,
-                      const Affine<float>& bones_from_model) noexcept;
-
 /// Throws if `triangles` [3 x any number] has a corner that is no vertex.
 void check_triangles(std::span<const std::int32_t> triangles, std::size_t vertex_count);
 

@@ -298,10 +298,10 @@ BoneSets find_bone_sets(const PackedMesh& mesh) {
     std::map<std::vector<std::int32_t>, std::size_t> known;
     // Adds the set of the `count` bones from `first` on, and its entries, which are `length` in all with padding.
     const auto add = [&](std::size_t first, std::size_t count, std::size_t length) {
-        const auto of = std::span(mesh.bones).subspan(first, count);
-        const auto [set, is_new] = known.try_emplace({of.begin(), of.end()}, known.size());
+        const auto bones = std::span(mesh.bones).subspan(first, count);
+        const auto [set, is_new] = known.try_emplace({bones.begin(), bones.end()}, known.size());
         if (is_new) {
-            sets.bones.insert(sets.bones.end(), of.begin(), of.end());
+            sets.bones.insert(sets.bones.end(), bones.begin(), bones.end());
             sets.offsets.push_back(static_cast<std::uint32_t>(sets.bones.size()));
         }
         const std::uint32_t begin = sets.offsets[set->second];

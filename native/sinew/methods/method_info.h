@@ -75,8 +75,8 @@ enum class Needs : unsigned {
 }
 
 /// Whether `needs` includes all flags of `of`.
-[[nodiscard]] constexpr bool has(Needs needs, Needs of) noexcept {
-    return (static_cast<unsigned>(needs) & static_cast<unsigned>(of)) == static_cast<unsigned>(of);
+[[nodiscard]] constexpr bool has(Needs needs, Needs flags) noexcept {
+    return (static_cast<unsigned>(needs) & static_cast<unsigned>(flags)) == static_cast<unsigned>(flags);
 }
 
 /// What methods are for. In the order of menus.

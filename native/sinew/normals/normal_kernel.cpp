@@ -163,11 +163,11 @@ HWY_INLINE Points<D> custom_normals(D d, const Points<D>& n, const FanEdges<D>& 
     const auto stays = hn::Or(hn::Eq(tilt, zero), hn::Or(hn::Eq(edges.mean_angle, zero), hn::Eq(beta, zero)));
     const auto has_space =
         hn::And(hn::Lt(hn::Abs(edges.along_first), steep), hn::Lt(hn::Abs(edges.along_last), steep));
-    const auto of = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+    const auto tilted = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
         const auto sum = hn::Add(hn::Add(hn::Mul(a, of_tilt.cosine), hn::Mul(b, on_x)), hn::Mul(c, on_y));
         return hn::IfThenElseZero(has_space, hn::IfThenElse(stays, a, sum));
     };
-    return {of(n.x, x.x, y.x), of(n.y, x.y, y.y), of(n.z, x.z, y.z)};
+    return {tilted(n.x, x.x, y.x), tilted(n.y, x.y, y.y), tilted(n.z, x.z, y.z)};
 }
 
 // --- Face normals and the angles of corners

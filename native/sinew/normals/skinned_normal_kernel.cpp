@@ -47,9 +47,9 @@ HWY_INLINE Cofactors<D> cofactors_of(D d, const SkinnedNormalFrame& frame, std::
 
 /// Unit vectors; 0 if a vector has no direction, or a length beyond the range of floats.
 template <class D>
-HWY_INLINE Points<D> moved_normals(D d, const Cofactors<D>& of, const Points<D>& n) {
-    const Points<D> v =
-        add_scaled<D>(add_scaled<D>(times<D>(n.x, of.axis[0]), n.y, of.axis[1]), n.z, of.axis[2]);
+HWY_INLINE Points<D> moved_normals(D d, const Cofactors<D>& cofactors, const Points<D>& n) {
+    const Points<D> v = add_scaled<D>(add_scaled<D>(times<D>(n.x, cofactors.axis[0]), n.y, cofactors.axis[1]),
+                                      n.z, cofactors.axis[2]);
     const Vec<D> squared = dot<D>(v, v);
     const auto has_direction = hn::And(hn::Gt(squared, hn::Set(d, kShortest)),
                                        hn::Le(squared, hn::Set(d, std::numeric_limits<float>::max())));
@@ -80,9 +80,9 @@ void of_vertices(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end
 void cofactors(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end) {
     const SkinnedNormalFrame frame = f;
     in_lanes(begin, end, [&frame](auto d, std::size_t i) HWY_ATTR {
-        const auto of = cofactors_of(d, frame, i);
+        const auto found = cofactors_of(d, frame, i);
         for (std::size_t axis = 0; axis < 3; ++axis) {
-            const auto& v = of.axis[axis];
+            const auto& v = found.axis[axis];
             store_float4s(d, v.x, v.y, v.z, v.z, &frame.cofactors[axis][i]);
         }
     });

@@ -10,8 +10,12 @@
 
 namespace sinew {
 
-/// The only list of stages, in the order in which they run after a method.
-inline constexpr std::array kStages{Mix::info, TwistSpreadStage::info, BulgeLimitStage::info,
-                                    DeltaMushStage::info};
+// The only list of stages, by their definitions, in the order in which they run after a method.
+#define SINEW_STAGES(each) each(Mix) each(TwistSpreadStage) each(BulgeLimitStage) each(DeltaMushStage)
+
+/// The facts about each stage, in the order of the list.
+#define SINEW_INFO(Stage) Stage::info,
+inline constexpr std::array kStages{SINEW_STAGES(SINEW_INFO)};
+#undef SINEW_INFO
 
 }  // namespace sinew

@@ -8,16 +8,16 @@
 
 #include "sinew/base/simd.h"
 #include "sinew/base/thread_pool.h"
-#include "sinew/bulge_limit.h"
 #include "sinew/deformer.h"
-#include "sinew/delta_mush.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
 #include "sinew/normals.h"
 #include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skinned_normals.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
 #include "sinew/transform/make.h"
-#include "sinew/twist_spread.h"
 
 namespace {
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the kernels of the stage `bulge_limit` on each instruction set against the definition in double,
 // its threads and options.
-#include "sinew/bulge_limit.h"
+#include "sinew/stages/bulge_limit/bulge_limit.h"
 
 #include <gtest/gtest.h>
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the stage `delta_mush` on each instruction set against its definition in double, its radius,
 // threads and degenerate meshes.
-#include "sinew/delta_mush.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 
 #include <algorithm>
 #include <string>
@@ -9,7 +9,6 @@
 #include "polygons.h"
 #include "scene.h"
 #include "sinew/base/simd.h"
-#include "sinew/stages/delta_mush/delta_mush.h"
 
 namespace sinew::test {
 namespace {

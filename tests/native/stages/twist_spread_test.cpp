@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Protects the kernels of the stage `twist_spread` on each instruction set against the definition in double,
 // its threads and options.
-#include "sinew/twist_spread.h"
+#include "sinew/stages/twist_spread/twist_spread.h"
 
 #include <gtest/gtest.h>
 

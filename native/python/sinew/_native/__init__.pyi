@@ -3,7 +3,6 @@ from __future__ import annotations
 import collections.abc
 import numpy
 import numpy.typing
-import sinew.interpolate
 import typing
 from . import affine
 from . import quat_vec
@@ -12,7 +11,7 @@ from . import dual
 from . import quat
 from . import interpolate
 from . import spline
-__all__: list[str] = ['Binding', 'BulgeLimit', 'Deformer', 'DeltaMush', 'Lock', 'Method', 'Normals', 'Parameter', 'Precomputation', 'Skeleton', 'SkinnedNormals', 'Stage', 'TwistSpread', 'affine', 'centres_of_rotation', 'direct_delta_mush', 'dual', 'dual_quat', 'interpolate', 'keep_thread_state', 'methods', 'quat', 'quat_vec', 'spline', 'stages', 'thread_id', 'weights_in_memory']
+__all__: list = ['Parameter', 'Method', 'Stage', 'methods', 'stages', 'Skeleton', 'Binding', 'Deformer', 'Normals', 'SkinnedNormals', 'Precomputation', 'centres_of_rotation', 'direct_delta_mush', 'Lock', 'thread_id', 'keep_thread_state', 'weights_in_memory', 'TwistSpread', 'BulgeLimit', 'DeltaMush']
 class Parameter:
     """A setting of a method or of a stage."""
     def __repr__(self) -> str: ...
@@ -110,36 +109,11 @@ class Skeleton:
         """
     def __repr__(self) -> str: ...
     def __setstate__(self, arg0: typing.Any) -> None: ...
-    def interpolate(self, a: numpy.typing.ArrayLike, b: numpy.typing.ArrayLike, t: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb') -> tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]:
-        """(transforms, is_defined): the skeleton between two keyframes (Smith 2013, algorithm 2).
-
-        a, b: [bones, ..] in the layout of the method, at t = 0 and t = 1.
-        t: a number, or [..], for which the results are [.., bones, ..] and [..]; extrapolates outside 0 to 1.
-        method: one of sinew.interpolate.METHODS.
-
-        is_defined is False if the result is not defined for some bone, which then has the result that
-        sinew.interpolate specifies.
-        """
     def root_relative(self, transforms: numpy.typing.ArrayLike, root: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[typing.Any]:
         """Each bone relative to the root, in the layout of `transforms` (Smith 2013, algorithm 1).
 
         transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7]; [bones, 8].
         root: None, or a transform that is applied after that of every bone without a parent.
-        """
-    def spline(self, keyframes: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, time: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb') -> tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]:
-        """(transforms, is_defined): the skeleton on a Catmull-Rom spline through keyframes, in blend form (Smith
-        2013, algorithm 3 and section 3.2.2).
-
-        keyframes: [keys, bones, ..] in the layout of the method, at least one key.
-        times: [keys], non-decreasing; keys of equal time are a cut.
-        time: a number, or [..], for which the results are [.., bones, ..] and [..]; constant before the first key and
-            after the last.
-        method: one of sinew.interpolate.METHODS.
-        """
-    def spline_vector(self, keyframes: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, time: numpy.typing.ArrayLike) -> tuple[numpy.typing.NDArray[typing.Any], bool | numpy.typing.NDArray[numpy.bool_]]:
-        """As spline(), in vector form (Smith 2013, algorithm 3): not rigid between keys.
-
-        keyframes: [keys, bones, 4, 4], [keys, bones, 3, 4], [keys, bones, 7] or [keys, bones, 8].
         """
     def update_branch(self, root_relative: numpy.typing.ArrayLike, transforms: numpy.typing.ArrayLike, bone: typing.SupportsIndex, root: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[typing.Any]:
         """The result of root_relative() after a change of one bone: computes only that bone and its descendants.
@@ -234,134 +208,6 @@ class Deformer:
     @property
     def mixed_method(self) -> str | None:
         """The name of the method that `mix` adds, or None."""
-    @property
-    def vertex_count(self) -> int:
-        """Number of vertices."""
-class TwistSpread:
-    """The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
-    bones do. Applied after Deformer.deform() and before all other stages.
-    """
-    def __init__(self, binding: Binding, twists: numpy.typing.ArrayLike, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike, *, parents: numpy.typing.ArrayLike | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None, mix: numpy.typing.ArrayLike | None = None) -> None:
-        """binding: the mesh. Its memory is shared.
-        twists: int32 [twists, 4], a bone before those that it carries. The first bone's vertices share, about the line from
-            its head to its tail, the twist of the third bone relative to the second. The fourth number is 0 where it is
-            added towards the tail (the hand's twist to the forearm), 1 where it is taken back towards the head (an upper
-            arm's own).
-        heads, tails: float32 [twists, 3], between which the share of the twist grows from 0 to 1, at rest, in the space of
-            the bone transforms. Where both are the same, the line is along the bone's Y axis.
-        rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], each bone at rest in that space, Y along it.
-        parents: None, or int32 [bones], -1 for none. Only twists beyond half a turn need them.
-        bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
-        weights: None, or float32 [vertices], how much each vertex takes part, 0 to 1; clamped.
-        mix: None, or float32 [vertices], the weights of Deformer's `mix`.
-        """
-    def __repr__(self) -> str: ...
-    def angles(self, bone_transforms: numpy.typing.ArrayLike, channels: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """The twists in a pose, float32 [twists], radians, as apply() spreads them by an amount of 1: faded from 150
-        degrees to 180, where a matrix does not tell them.
-
-        bone_transforms, channels: as for apply().
-        """
-    def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, amount: float = 1.0, amounts: numpy.typing.ArrayLike | None = None, curves: numpy.typing.ArrayLike | None = None, channels: numpy.typing.ArrayLike | None = None, blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', mix_blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """The twisted points, float32 [vertices, 3], model space.
-
-        points: float32 [vertices, 3], deformed, model space.
-        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
-        out: may be `points`.
-        amount: how much of each twist is spread, 0 to 1.
-        amounts: None, or float32 [twists], the same for each bone.
-        curves: None, or float32 [twists], -1 to 1: below 0 more of the twist is near the tail, above 0 near the head.
-        channels: None, or float32 [twists, 7], the rotation channels of each tip: its rotation from rest on its own rest
-            axes, (w, x, y, z), and Euler angles or the product of angle and unit axis, radians. They say how far beyond half
-            a turn it went, up to two turns, unless something else rotates the bone as well. All 0: unknown.
-        blend: how the method of the points blends rotations: "linear" (lbs), "matrices" (ddm), "rotations" (all others), or
-            "logarithms" (log, dib). With "linear" the bone's matrix M of each vertex becomes M R; otherwise the vertex is
-            rotated about the posed axis by its weight times its share of the twist.
-        mix_blend: the same for the second method, where `mix` is above 0.
-
-        Where no bone is twisted, no bit changes.
-        """
-    def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
-        """Sets other rest points, float32 [vertices, 3], or another space of the bones."""
-    @property
-    def bone_count(self) -> int:
-        """How many bones a pose must have."""
-    @property
-    def twist_count(self) -> int:
-        """Number of twists."""
-    @property
-    def vertex_count(self) -> int:
-        """Number of vertices."""
-class BulgeLimit:
-    """The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
-    them farther away than they are at rest (Kim, Han 2014, and a continuous form).
-    """
-    def __init__(self, binding: Binding, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, *, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None) -> None:
-        """binding: the mesh. Its memory is shared.
-        heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
-        bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
-        weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.
-        """
-    def __repr__(self) -> str: ...
-    def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, strength: float = 1.0, form: typing.Literal['continuous', 'kim_han'] = 'continuous', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """The limited points, float32 [vertices, 3], model space.
-
-        points: float32 [vertices, 3], deformed, model space.
-        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
-        out: may be `points`.
-        strength: how much of the bulge is removed, 0 to 1.
-        form: "continuous": distances to all bones of a vertex, weighted; "kim_han": only to the heaviest, which tears
-            the surface where that changes.
-
-        Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. A scaled
-        bone allows a distance larger by the largest factor by which it stretches vectors perpendicular to it.
-        """
-    def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
-        """Sets other rest points, float32 [vertices, 3], or another space of the bones. Measures distances at
-        rest again, which takes about as long as apply().
-        """
-    @property
-    def bone_count(self) -> int:
-        """How many bones a pose must have: one more than the highest that an influence or vertex data names."""
-    @property
-    def vertex_count(self) -> int:
-        """Number of vertices."""
-class DeltaMush:
-    """The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
-    (Mancewicz et al. 2014), as Blender's Corrective Smooth does.
-    """
-    def __init__(self, rest_points: numpy.typing.ArrayLike, face_offsets: numpy.typing.ArrayLike, corner_vertices: numpy.typing.ArrayLike, edges: numpy.typing.ArrayLike, *, iterations: typing.SupportsIndex = 5, radius: float = 0.0, factor: float = 0.5, smooth_type: typing.Literal['simple', 'length_weighted'] = 'simple', pin_boundary: bool = False, weights: numpy.typing.ArrayLike | None = None) -> None:
-        """rest_points: float32 [vertices, 3], without shape keys; at most 2^29 - 1 vertices.
-        face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
-        corner_vertices: int32 [corners], the vertex of each corner.
-        edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces.
-        iterations: number of smoothing iterations, 0 to 1,000; not used with a radius.
-        radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian, independently of
-            the density of the mesh; 0: use `iterations`. The shortest tenth of edges is smoothed less far, and so are
-            all where this would take more than 1,000 iterations.
-        factor: how far one iteration moves a vertex, 0 to 1.
-        smooth_type: "simple", or "length_weighted": neighbours are weighted by the length of their edges.
-        pin_boundary: whether vertices on edges with a single face are not moved.
-        weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.
-        """
-    def __repr__(self) -> str: ...
-    def apply(self, points: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, scale: float = 1.0, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
-        """The smoothed points, float32 [vertices, 3].
-
-        points: float32 [vertices, 3], deformed, in the space of the rest points.
-        out: may be `points`.
-        scale: how much of the details is added back; 1: all.
-
-        A vertex without faces is smoothed and has no details.
-        """
-    def bind(self, rest_points: numpy.typing.ArrayLike, *, iterations: typing.SupportsIndex = 5, radius: float = 0.0, factor: float = 0.5, smooth_type: typing.Literal['simple', 'length_weighted'] = 'simple', pin_boundary: bool = False, weights: numpy.typing.ArrayLike | None = None) -> None:
-        """Sets other rest points and settings for the same faces and edges, which takes about as long as apply().
-
-        The arguments and errors are those of the constructor; after an error the object is unchanged.
-        """
-    @property
-    def iterations(self) -> int:
-        """Number of smoothing iterations, also if a radius determines it."""
     @property
     def vertex_count(self) -> int:
         """Number of vertices."""
@@ -462,6 +308,136 @@ class Lock:
     def __exit__(self, arg0: typing.Any, arg1: typing.Any, arg2: typing.Any) -> None: ...
     def __init__(self) -> None:
         """A thread that is inside may enter again. A forked child finds nobody inside."""
+class TwistSpread:
+    """The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist
+    bones do. Applied after Deformer.deform() and before all other stages.
+    """
+    def __init__(self, binding: Binding, twists: numpy.typing.ArrayLike, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, rest_bones: numpy.typing.ArrayLike, *, parents: numpy.typing.ArrayLike | None = None, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None, mix: numpy.typing.ArrayLike | None = None) -> None:
+        """binding: the mesh. Its memory is shared.
+        twists: int32 [twists, 4], a bone before those that it carries. The first bone's vertices share, about the line from
+            its head to its tail, the twist of the third bone relative to the second. The fourth number is 0 where it is
+            added towards the tail (the hand's twist to the forearm), 1 where it is taken back towards the head (an upper
+            arm's own).
+        heads, tails: float32 [twists, 3], between which the share of the twist grows from 0 to 1, at rest, in the space of
+            the bone transforms. Where both are the same, the line is along the bone's Y axis.
+        rest_bones: float32 [bones, 4, 4] or [bones, 3, 4], each bone at rest in that space, Y along it.
+        parents: None, or int32 [bones], -1 for none. Only twists beyond half a turn need them.
+        bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
+        weights: None, or float32 [vertices], how much each vertex takes part, 0 to 1; clamped.
+        mix: None, or float32 [vertices], the weights of Deformer's `mix`.
+        """
+    def __repr__(self) -> str: ...
+    def angles(self, bone_transforms: numpy.typing.ArrayLike, channels: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[numpy.float32]:
+        """The twists in a pose, float32 [twists], radians, as apply() spreads them by an amount of 1: faded from 150
+        degrees to 180, where a matrix does not tell them.
+
+        bone_transforms, channels: as for apply().
+        """
+    def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, amount: float = 1.0, amounts: numpy.typing.ArrayLike | None = None, curves: numpy.typing.ArrayLike | None = None, channels: numpy.typing.ArrayLike | None = None, blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', mix_blend: typing.Literal['linear', 'matrices', 'rotations', 'logarithms'] = 'linear', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
+        """The twisted points, float32 [vertices, 3], model space.
+
+        points: float32 [vertices, 3], deformed, model space.
+        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
+        out: may be `points`.
+        amount: how much of each twist is spread, 0 to 1.
+        amounts: None, or float32 [twists], the same for each bone.
+        curves: None, or float32 [twists], -1 to 1: below 0 more of the twist is near the tail, above 0 near the head.
+        channels: None, or float32 [twists, 7], the rotation channels of each tip: its rotation from rest on its own rest
+            axes, (w, x, y, z), and Euler angles or the product of angle and unit axis, radians. They say how far beyond half
+            a turn it went, up to two turns, unless something else rotates the bone as well. All 0: unknown.
+        blend: how the method of the points blends rotations: "linear" (lbs), "matrices" (ddm), "rotations" (all others), or
+            "logarithms" (log, dib). With "linear" the bone's matrix M of each vertex becomes M R; otherwise the vertex is
+            rotated about the posed axis by its weight times its share of the twist.
+        mix_blend: the same for the second method, where `mix` is above 0.
+
+        Where no bone is twisted, no bit changes.
+        """
+    def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
+        """Sets other rest points, float32 [vertices, 3], or another space of the bones, which takes about as long
+        as apply().
+        """
+    @property
+    def bone_count(self) -> int:
+        """How many bones a pose must have."""
+    @property
+    def twist_count(self) -> int:
+        """Number of twists."""
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
+class BulgeLimit:
+    """The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took
+    them farther away than they are at rest (Kim, Han 2014, and a continuous form).
+    """
+    def __init__(self, binding: Binding, heads: numpy.typing.ArrayLike, tails: numpy.typing.ArrayLike, *, bones_from_model: numpy.typing.ArrayLike | None = None, weights: numpy.typing.ArrayLike | None = None) -> None:
+        """binding: the mesh. Its memory is shared.
+        heads, tails: float32 [bones, 3], the ends of each bone at rest, in the space of the bone transforms.
+        bones_from_model: float32 [4, 4] or [3, 4], maps model space to that space. None: the same space.
+        weights: None, or float32 [vertices], how much each vertex is limited, 0 to 1; clamped.
+        """
+    def __repr__(self) -> str: ...
+    def apply(self, points: numpy.typing.ArrayLike, bone_transforms: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, *, strength: float = 1.0, form: typing.Literal['continuous', 'kim_han'] = 'continuous', threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
+        """The limited points, float32 [vertices, 3], model space.
+
+        points: float32 [vertices, 3], deformed, model space.
+        bone_transforms: float32 [bones, 4, 4] or [bones, 3, 4], posed_from_rest, as for Deformer.deform().
+        out: may be `points`.
+        strength: how much of the bulge is removed, 0 to 1.
+        form: "continuous": distances to all bones of a vertex, weighted; "kim_han": only to the heaviest, which tears
+            the surface where that changes.
+
+        Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit. A scaled
+        bone allows a distance larger by the largest factor by which it stretches vectors perpendicular to it.
+        """
+    def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
+        """Sets other rest points, float32 [vertices, 3], or another space of the bones, which takes about as long
+        as apply().
+        """
+    @property
+    def bone_count(self) -> int:
+        """How many bones a pose must have."""
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
+class DeltaMush:
+    """The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back
+    (Mancewicz et al. 2014), as Blender's Corrective Smooth does.
+    """
+    def __init__(self, rest_points: numpy.typing.ArrayLike, face_offsets: numpy.typing.ArrayLike, corner_vertices: numpy.typing.ArrayLike, edges: numpy.typing.ArrayLike, *, iterations: typing.SupportsIndex = 5, radius: float = 0.0, factor: float = 0.5, smooth_type: typing.Literal['simple', 'length_weighted'] = 'simple', pin_boundary: bool = False, weights: numpy.typing.ArrayLike | None = None) -> None:
+        """rest_points: float32 [vertices, 3], without shape keys; at most 2^29 - 1 vertices.
+        face_offsets: int32 [faces + 1], the first corner of each polygon, then the end.
+        corner_vertices: int32 [corners], the vertex of each corner.
+        edges: int32 [edges, 2], the vertices of all edges of faces, and of edges without faces.
+        iterations: number of smoothing iterations, 0 to 1,000; not used with a radius.
+        radius: how far the smoothing reaches, in units of the points, as the width of a Gaussian, independently of
+            the density of the mesh; 0: use `iterations`. The shortest tenth of edges is smoothed less far, and so are
+            all where this would take more than 1,000 iterations.
+        factor: how far one iteration moves a vertex, 0 to 1.
+        smooth_type: "simple", or "length_weighted": neighbours are weighted by the length of their edges.
+        pin_boundary: whether vertices on edges with a single face are not moved.
+        weights: None, or float32 [vertices], how much each vertex is smoothed, 0 to 1; clamped.
+        """
+    def __repr__(self) -> str: ...
+    def apply(self, points: numpy.typing.ArrayLike, out: numpy.typing.NDArray[numpy.float32] | None = None, scale: float = 1.0, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.float32]:
+        """The smoothed points, float32 [vertices, 3].
+
+        points: float32 [vertices, 3], deformed, in the space of the rest points.
+        out: may be `points`.
+        scale: how much of the details is added back; 1: all.
+
+        A vertex without faces is smoothed and has no details.
+        """
+    def bind(self, rest_points: numpy.typing.ArrayLike, *, iterations: typing.SupportsIndex = 5, radius: float = 0.0, factor: float = 0.5, smooth_type: typing.Literal['simple', 'length_weighted'] = 'simple', pin_boundary: bool = False, weights: numpy.typing.ArrayLike | None = None) -> None:
+        """Sets other rest points and settings for the same faces and edges, which takes about as long as apply().
+
+        The arguments and errors are those of the constructor; after an error the object is unchanged.
+        """
+    @property
+    def iterations(self) -> int:
+        """Number of smoothing iterations, also if a radius determines it."""
+    @property
+    def vertex_count(self) -> int:
+        """Number of vertices."""
 def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
     """Starts to compute the vertex data of the method "cor": the optimised centre of rotation of each vertex,
     float32 [vertices, 3], model space, for `vertex_data` of Binding (Le, Hodgins 2016). It belongs to these rest
@@ -496,7 +472,7 @@ def keep_thread_state() -> None:
 def methods() -> tuple[Method, ...]:
     """All skinning methods."""
 def stages() -> tuple[Stage, ...]:
-    """All stages. `mix` is an argument of Deformer, `twist_spread` is TwistSpread, `bulge_limit` is BulgeLimit, `delta_mush` is DeltaMush."""
+    """All stages. `mix` is an argument of Deformer, each other a class: `bulge_limit` is BulgeLimit."""
 def thread_id() -> int:
     """A number that no other thread has as long as this one runs."""
 def weights_in_memory(address: typing.SupportsInt | typing.SupportsIndex, vertices: typing.SupportsInt | typing.SupportsIndex) -> tuple:

@@ -3,7 +3,7 @@ import numpy.typing
 import sinew._types
 import sinew.interpolate
 import typing
-__all__: list[str] = ['catmull_rom', 'catmull_rom_vector', 'hermite']
+__all__: list[str] = ['catmull_rom', 'catmull_rom_vector']
 def catmull_rom(keys: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, at: numpy.typing.ArrayLike, method: sinew.interpolate.Method = 'dlb') -> sinew._types.Blended[typing.Any]:
     """Blend form: the keys blended by `method` with the weights of the spline (Smith 2013, section 3.2.2).
 
@@ -17,14 +17,4 @@ def catmull_rom_vector(keys: numpy.typing.ArrayLike, times: numpy.typing.ArrayLi
     3).
 
     Rigid only at the keys; the layout's normalized() makes it rigid everywhere.
-    """
-def hermite(keys: numpy.typing.ArrayLike, tangents: numpy.typing.ArrayLike, times: numpy.typing.ArrayLike, at: numpy.typing.ArrayLike) -> sinew._types.Blended[typing.Any]:
-    """The cubic Hermite spline through keys with arbitrary tangents (Smith 2013, section 2.3.2).
-
-    keys: [n, 3], points, or [n, 8], rigid transforms.
-    tangents: for a unit of time. Of points [n, 3]. Of transforms [n, 6], twists in each key's own axes: after a
-        short time h the curve is compose(key, from_twist(h * tangent)).
-
-    For transforms it is a Bezier curve whose chords are screws (Shoemake 1985, for quaternions): rigid throughout.
-    Not defined where "sclerp" is not defined between two of its control poses.
     """

@@ -43,8 +43,8 @@ HWY_INLINE void store(const Row& row, double* x) {
     for (std::size_t v = 0; v < kVectors; ++v) hn::StoreU(row.part[v], d, x + v * hn::Lanes(d));
 }
 
-HWY_INLINE void subtract(double by, const Row& from, Row& row) {
-    const DoubleVec scale = hn::Set(Doubles(), by);
+HWY_INLINE void subtract(double factor, const Row& from, Row& row) {
+    const DoubleVec scale = hn::Set(Doubles(), factor);
     for (std::size_t v = 0; v < kVectors; ++v) {
         row.part[v] = hn::NegMulAdd(scale, from.part[v], row.part[v]);
     }
@@ -54,11 +54,11 @@ HWY_INLINE void subtract(double by, const Row& from, Row& row) {
 HWY_INLINE bool clear_small(double least, double* x) {
     bool any_nonzero = false;
     for (std::size_t group = 0; group < kGroups; ++group) {
-        double* const own = x + kGroupColumns * group;
-        if (own[0] >= least) {
+        double* const numbers = x + kGroupColumns * group;
+        if (numbers[0] >= least) {
             any_nonzero = true;
         } else {
-            std::fill_n(own, kGroupColumns, 0.0);
+            std::fill_n(numbers, kGroupColumns, 0.0);
         }
     }
     return any_nonzero;

@@ -148,8 +148,8 @@ struct MomentRows {
 
 HWY_INLINE MomentRows rows_of(const BoneMoments& moments, std::size_t b, std::size_t lane) {
     const auto& first_rows = moments.blocks[b].first_rows;
-    const auto part = [&](MomentPart of) {
-        const auto i = static_cast<std::size_t>(of);
+    const auto part = [&](MomentPart which) {
+        const auto i = static_cast<std::size_t>(which);
         return moments.parts[i].data()[first_rows[i]].lane.data() + lane;
     };
     return {part(MomentPart::first_weight), part(MomentPart::weight), part(MomentPart::first),
@@ -213,15 +213,15 @@ HWY_INLINE void add_moved(D d, const float* row, const Points<D>* p, const Vec<D
 /// Adds a quaternion in the hemisphere of the sum before it.
 template <class D>
 HWY_INLINE void add_signed(D d, const float* q, Vec<D> weight, Vec<D>* sum) {
-    const Vec<D> by = hn::IfThenElse(hn::Lt(dot(d, q, sum), hn::Zero(d)), hn::Neg(weight), weight);
-    for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(by, hn::Set(d, q[i]), sum[i]);
+    const Vec<D> signed_weight = hn::IfThenElse(hn::Lt(dot(d, q, sum), hn::Zero(d)), hn::Neg(weight), weight);
+    for (std::size_t i = 0; i < 4; ++i) sum[i] = hn::MulAdd(signed_weight, hn::Set(d, q[i]), sum[i]);
 }
 
 /// Blends the bones of kVectors neighbouring vectors by the moments: the quaternion, and the displacement of the
 /// centroid.
 ///
 /// kCount  the number of bones, or 0 for any number
-template <bool kFirst, bool kAbsolute, bool kResolved, std::size_t kCount, std::size_t kVectors, class D>
+template <bool kFirst, bool kResolved, std::size_t kCount, std::size_t kVectors, class D>
 HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& rows,
                               const Points<D>* centroids, Motion<D>* motions) {
     alignas(64) float space[kDdmNumbers];
@@ -232,7 +232,8 @@ HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& r
         moved[v] = {zero, zero, zero};
         for (Vec<D>& number : motions[v].rotation) number = zero;
     }
-    if (!kAbsolute) {
+    const bool is_absolute = !kResolved && bones.is_absolute;
+    if (!is_absolute) {
         const float* const first = bones.row(0, space);
         Vec<D> one[kVectors];
         for (Vec<D>& weight : one) weight = hn::Set(d, 1.0f);
@@ -246,7 +247,7 @@ HWY_INLINE void blend_moments(D d, const MomentBones& bones, const MomentRows& r
         }
     }
     const std::size_t count = kCount > 0 ? kCount : bones.count;
-    for (std::size_t k = kAbsolute ? 0 : 1; k < count; ++k) {
+    for (std::size_t k = is_absolute ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         Vec<D> weight[kVectors];
         Points<D> first[kVectors];
@@ -310,7 +311,7 @@ HWY_INLINE Points<D> add_product(D d, const float* r, const Symmetric<D>& m, con
 /// in model space.
 ///
 /// displacement  of the centroid
-template <bool kAbsolute, std::size_t kCount, class D>
+template <bool kResolved, std::size_t kCount, class D>
 HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows& rows,
                                 const Points<D>& centroid, const Points<D>& displacement,
                                 const float* from_model) {
@@ -325,26 +326,28 @@ HWY_INLINE Rows3<D> correlation(D d, const MomentBones& bones, const MomentRows&
                                   sum.z = add_product(d, z, m, sum.z);
                               };
     if (from_model != nullptr) add_rows(from_model, from_model + 4, from_model + 8, total);
-    if (!kAbsolute) {
+    const bool is_absolute = !kResolved && bones.is_absolute;
+    if (!is_absolute) {
         const float* const first = bones.row(0, space);
         add_rows(first + 4, first + 8, first + 12, total);
     }
     const Vec<D> one = hn::Set(d, 1.0f);
     const Vec<D> zero = hn::Zero(d);
     const std::size_t count = kCount > 0 ? kCount : bones.count;
-    for (std::size_t k = kAbsolute ? 0 : 1; k < count; ++k) {
+    for (std::size_t k = is_absolute ? 0 : 1; k < count; ++k) {
         const float* const row = bones.row(k, space);
         add_rows(row + 4, row + 8, row + 12, load_symmetric(d, rows.second, 6 + 6 * k));
         // The first moments about the centroid have sum 0, so only differences between bones count.
         Points<D> moved =
-            kAbsolute ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
-                      : Points<D>{zero, zero, zero};
+            is_absolute ? Points<D>{hn::Neg(displacement.x), hn::Neg(displacement.y), hn::Neg(displacement.z)}
+                        : Points<D>{zero, zero, zero};
         add_moved<1>(d, row, &centroid, &one, &moved);
         const Vec<D> weight = load_weight(d, rows, k);
-        const Points<D> by = add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
-        sum.x = add_scaled<D>(sum.x, moved.x, by);
-        sum.y = add_scaled<D>(sum.y, moved.y, by);
-        sum.z = add_scaled<D>(sum.z, moved.z, by);
+        const Points<D> about_centroid =
+            add_scaled<D>(load_point(d, rows.first, 3 * k), hn::Neg(weight), centroid);
+        sum.x = add_scaled<D>(sum.x, moved.x, about_centroid);
+        sum.y = add_scaled<D>(sum.y, moved.y, about_centroid);
+        sum.z = add_scaled<D>(sum.z, moved.z, about_centroid);
     }
     return sum;
 }
@@ -373,8 +376,8 @@ HWY_INLINE Rows3<D> rotated_back(D d, const Vec<D>* q, const Rows3<D>& m) {
     const Vec<D> zz = hn::Mul(z, q[3]);
     // Row i of the result is the rows of m weighted by column i of the rotation. The identity is added
     // separately.
-    const auto combined = [&](const Points<D>& own, Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
-        return add_scaled<D>(add_scaled<D>(add_scaled<D>(own, a, m.x), b, m.y), c, m.z);
+    const auto combined = [&](const Points<D>& row, Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
+        return add_scaled<D>(add_scaled<D>(add_scaled<D>(row, a, m.x), b, m.y), c, m.z);
     };
     return {combined(m.x, hn::Neg(hn::Add(yy, zz)), hn::Add(xy, wz), hn::Sub(xz, wy)),
             combined(m.y, hn::Sub(xy, wz), hn::Neg(hn::Add(xx, zz)), hn::Add(yz, wx)),
@@ -412,9 +415,9 @@ HWY_INLINE hn::Mask<D> step_to_nearest(D d, const Rows3<D>& matrix, Vec<D>* q) {
                                      hn::And(hn::Gt(determinant, least), hn::Gt(trace, zero)));
     const Vec<D> scale = hn::IfThenElseZero(
         has_maximum, hn::Div(hn::Set(d, 0.5f), hn::IfThenElse(has_maximum, determinant, hn::Set(d, 1.0f))));
-    const auto solved = [&](const Points<D>& v, Vec<D> by) HWY_ATTR {
+    const auto solved = [&](const Points<D>& v, Vec<D> factor) HWY_ATTR {
         const auto along = [&](Vec<D> a, Vec<D> b, Vec<D> c) HWY_ATTR {
-            return hn::Mul(by, hn::MulAdd(a, v.x, hn::MulAdd(b, v.y, hn::Mul(c, v.z))));
+            return hn::Mul(factor, hn::MulAdd(a, v.x, hn::MulAdd(b, v.y, hn::Mul(c, v.z))));
         };
         return Points<D>{along(first.x, first.y, first.z), along(first.y, second_y, second_z),
                          along(first.z, second_z, minor)};
@@ -523,17 +526,16 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
         const float* const of_bone = block.own_bones ? weights + kLanes * k
                                      : k == 0        ? first_weights_of(frame, b) + lane
                                                      : weights + kLanes * (k - 1);
-        Points<D> by;
-        if (!scaled(d, *frame.palette, bones[k], rest, by)) continue;
-        const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), by);
+        Points<D> added;
+        if (!scaled(d, *frame.palette, bones[k], rest, added)) continue;
+        const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), added);
         total = add_scaled<D>(total, hn::Load(d, of_bone), rotated);
     }
     return total;
 }
 
 /// Deforms lanes [lane, lane + kVectors * N) of a block.
-template <Variant kVariant, bool kAbsolute, bool kResolved, std::size_t kCount = 0, std::size_t kVectors = 1,
-          class D>
+template <Variant kVariant, bool kResolved, std::size_t kCount = 0, std::size_t kVectors = 1, class D>
 HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, const Spaces& spaces,
                              const MomentBones& bones, std::size_t b, std::size_t lane) {
     const MomentRows rows = rows_of(moments_of(frame), b, lane);
@@ -542,14 +544,14 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     Motion<D> motions[kVectors];
     for (std::size_t v = 0; v < kVectors; ++v) centroids[v] = load_point(d, rows.weight + v * step, 0);
     if constexpr (kVariant == Variant::weights && kResolved) {
-        blend_motions<kVectors, kCount, false>(d, bones.rows(), bones.count, nullptr,
-                                               rows.weight + 3 * kLanes, centroids, motions);
+        blend_motions<kVectors, kCount>(d, bones.rows(), bones.count, rows.weight + 3 * kLanes, centroids,
+                                        motions);
     } else {
-        blend_moments<kVariant != Variant::weights, kAbsolute, kResolved, kCount, kVectors>(
-            d, bones, rows, centroids, motions);
+        blend_moments<kVariant != Variant::weights, kResolved, kCount, kVectors>(d, bones, rows, centroids,
+                                                                                 motions);
     }
     if constexpr (kVariant == Variant::nearest) {
-        const Rows3<D> matrix = correlation<kAbsolute, kCount>(
+        const Rows3<D> matrix = correlation<kResolved, kCount>(
             d, bones, rows, centroids[0], motions[0].displacement, spaces.bones_from_model);
         to_nearest(d, matrix, is_point_at(d, rows.second, centroids[0]), spaces.bones_from_model,
                    motions[0].rotation);
@@ -567,7 +569,7 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
 /// Deforms blocks [begin, end) with the same bones.
 ///
 /// kCount  the number of bones, or 0 for any number
-template <Variant kVariant, bool kAbsolute, bool kResolved, std::size_t kCount = 0>
+template <Variant kVariant, bool kResolved, std::size_t kCount = 0>
 void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t begin, std::size_t end) {
     const Full d;
     // The matrices of variant 0 leave no registers for a second vector.
@@ -579,11 +581,10 @@ void deform_blocks(const Frame& frame, const MomentBones& bones, std::size_t beg
         if (kVariant == Variant::nearest) prefetch_moments(frame, b + 1);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
             if (kVectors > 1 && lane + hn::Lanes(d) >= lanes) {
-                deform_lanes<kVariant, kAbsolute, kResolved, kCount>(d, frame, pointers, spaces, bones, b,
-                                                                     lane);
+                deform_lanes<kVariant, kResolved, kCount>(d, frame, pointers, spaces, bones, b, lane);
             } else {
-                deform_lanes<kVariant, kAbsolute, kResolved, kCount, kVectors>(d, frame, pointers, spaces,
-                                                                               bones, b, lane);
+                deform_lanes<kVariant, kResolved, kCount, kVectors>(d, frame, pointers, spaces, bones, b,
+                                                                    lane);
             }
         }
     }
@@ -593,15 +594,14 @@ template <Variant kVariant>
 void deform_set_of(const Frame& frame, std::size_t begin, std::size_t end) {
     const MomentBlock& block = moments_of(frame).blocks[begin];
     const MomentBones bones(frame, &moments_of(frame).bones[block.first_bone], block.bones);
-    if (HWY_UNLIKELY(bones.is_absolute))
-        return deform_blocks<kVariant, true, false>(frame, bones, begin, end);
-    if (!bones.is_resolved) return deform_blocks<kVariant, false, false>(frame, bones, begin, end);
+    if (bones.is_absolute || !bones.is_resolved)
+        return deform_blocks<kVariant, false>(frame, bones, begin, end);
     switch (bones.count) {
-        case 1: return deform_blocks<kVariant, false, true, 1>(frame, bones, begin, end);
-        case 2: return deform_blocks<kVariant, false, true, 2>(frame, bones, begin, end);
-        case 3: return deform_blocks<kVariant, false, true, 3>(frame, bones, begin, end);
-        case 4: return deform_blocks<kVariant, false, true, 4>(frame, bones, begin, end);
-        default: return deform_blocks<kVariant, false, true>(frame, bones, begin, end);
+        case 1: return deform_blocks<kVariant, true, 1>(frame, bones, begin, end);
+        case 2: return deform_blocks<kVariant, true, 2>(frame, bones, begin, end);
+        case 3: return deform_blocks<kVariant, true, 3>(frame, bones, begin, end);
+        case 4: return deform_blocks<kVariant, true, 4>(frame, bones, begin, end);
+        default: return deform_blocks<kVariant, true>(frame, bones, begin, end);
     }
 }
 
@@ -615,12 +615,10 @@ void deform_lane_by_lane(const Frame& frame, std::size_t b) {
     for (std::size_t lane = 0; lane < pointers.blocks[b].vertices; ++lane) {
         const std::size_t first = block.first_bone + (block.own_bones ? block.bones * lane : 0);
         const MomentBones bones(frame, &moments_of(frame).bones[first], block.bones);
-        if (bones.is_absolute) {
-            deform_lanes<kVariant, true, false>(d, frame, pointers, spaces, bones, b, lane);
-        } else if (bones.is_resolved) {
-            deform_lanes<kVariant, false, true>(d, frame, pointers, spaces, bones, b, lane);
+        if (bones.is_resolved && !bones.is_absolute) {
+            deform_lanes<kVariant, true>(d, frame, pointers, spaces, bones, b, lane);
         } else {
-            deform_lanes<kVariant, false, false>(d, frame, pointers, spaces, bones, b, lane);
+            deform_lanes<kVariant, false>(d, frame, pointers, spaces, bones, b, lane);
         }
     }
 }

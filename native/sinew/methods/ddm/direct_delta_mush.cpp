@@ -125,9 +125,9 @@ public:
                 begin_ = column;
             }
             if (column == begin_) {
-                const auto of = rows_of(column);
-                below_.assign(of.begin(), of.end());
-                numbers_ = of.size();
+                const auto rows = rows_of(column);
+                below_.assign(rows.begin(), rows.end());
+                numbers_ = rows.size();
             }
         }
         if (columns > 0) close(columns);
@@ -146,11 +146,12 @@ private:
         const std::size_t width = column + 1 - begin_;
         if (width > kMaxColumns) return false;
         if (below_.empty() || below_.front() != static_cast<std::int32_t>(column)) return false;
-        const auto of = rows_of(column);
+        const auto rows = rows_of(column);
         merged_.clear();
-        std::set_union(below_.begin() + 1, below_.end(), of.begin(), of.end(), std::back_inserter(merged_));
+        std::set_union(below_.begin() + 1, below_.end(), rows.begin(), rows.end(),
+                       std::back_inserter(merged_));
         const std::size_t all = width * merged_.size() + BlockFactor::triangle(width);
-        const std::size_t numbers = numbers_ + of.size();
+        const std::size_t numbers = numbers_ + rows.size();
         if (static_cast<double>(all - numbers) > kMaxZeros * static_cast<double>(all)) return false;
         below_.swap(merged_);
         numbers_ = numbers;

@@ -89,12 +89,12 @@ HWY_INLINE Points<D> angular_part(D d, const Vec<D>* q) {
                                        -0.0651833787560463f,
                                        0.022325647994875908f};
     const Vec<D> u = hn::Sub(hn::Set(d, 1.0f), hn::Abs(q[0]));
-    Vec<D> by = hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]);
+    Vec<D> factor = hn::CopySignToAbs(polynomial(d, u, kAngle), q[0]);
     if constexpr (kKeepsSigns) {
         const Vec<D> round = hn::Div(hn::Set(d, 2.0f * std::numbers::pi_v<float>), sine_of(d, q));
-        by = hn::IfThenElse(hn::Lt(q[0], hn::Zero(d)), hn::Add(round, by), by);
+        factor = hn::IfThenElse(hn::Lt(q[0], hn::Zero(d)), hn::Add(round, factor), factor);
     }
-    return times<D>(by, {q[1], q[2], q[3]});
+    return times<D>(factor, {q[1], q[2], q[3]});
 }
 
 /// The linear part, for the motion that rotates by `q`, then adds `translation`.
@@ -152,8 +152,9 @@ struct SharedBones {
         const float* const row = row_of<CentreRows::kNumbers>(palette, bones[k]);
         for (std::size_t i = 0; i < 4; ++i) image.rotation[i] = hn::Set(d, row[i]);
         image.point = displaced(d, row + 4, rest);
-        Points<D> by;
-        if (scaled(d, palette, bones[k], rest, by)) image.point = add<D>(image.point, rotated_by(d, row, by));
+        Points<D> added;
+        if (scaled(d, palette, bones[k], rest, added))
+            image.point = add<D>(image.point, rotated_by(d, row, added));
     }
 };
 
@@ -228,9 +229,9 @@ HWY_INLINE void blend_dual_quaternions(D d, const Images<D, BonesOf>& images, st
                                      hn::Add(hn::Mul(q[1], real[1]), hn::Mul(q[3], real[3])));
         const Vec<D> weight = weight_of(k);
         const auto is_away = hn::Lt(kKeepsSigns ? zero : along, zero);
-        const Vec<D> by = hn::IfThenElse(is_away, hn::Neg(weight), weight);
-        for (std::size_t i = 0; i < 4; ++i) real[i] = hn::MulAdd(by, q[i], real[i]);
-        const Points<D> translation = times<D>(by, subtract<D>(m.point, rest));
+        const Vec<D> signed_weight = hn::IfThenElse(is_away, hn::Neg(weight), weight);
+        for (std::size_t i = 0; i < 4; ++i) real[i] = hn::MulAdd(signed_weight, q[i], real[i]);
+        const Points<D> translation = times<D>(signed_weight, subtract<D>(m.point, rest));
         const Points<D> axis{q[1], q[2], q[3]};
         scalar = hn::Sub(scalar, dot<D>(translation, axis));
         vector = add_cross<D>(add_scaled<D>(vector, q[0], translation), translation, axis);

@@ -25,13 +25,13 @@ struct DqKernel {
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D>,
                                      Vec<D> signed_weight, const Points<D>& rest, Sum<D>& sum) {
-        Points<D> by;
-        if (!scaled(d, palette, bone, rest, by)) return;
+        Points<D> added;
+        if (!scaled(d, palette, bone, rest, added)) return;
         const float* const row = row_of(palette, bone);
         const Points<D> axis = in_all_lanes(d, row + 1);
-        const Points<D> rotated = add_scaled<D>(cross<D>(axis, by), hn::Set(d, row[0]), by);
+        const Points<D> rotated = add_scaled<D>(cross<D>(axis, added), hn::Set(d, row[0]), added);
         const Vec<D> half = hn::Mul(signed_weight, hn::Set(d, 0.5f));
-        sum.value[4] = hn::NegMulAdd(half, dot<D>(axis, by), sum.value[4]);
+        sum.value[4] = hn::NegMulAdd(half, dot<D>(axis, added), sum.value[4]);
         sum.value[5] = hn::MulAdd(half, rotated.x, sum.value[5]);
         sum.value[6] = hn::MulAdd(half, rotated.y, sum.value[6]);
         sum.value[7] = hn::MulAdd(half, rotated.z, sum.value[7]);
@@ -54,13 +54,13 @@ struct DqKernel {
 
     static HWY_INLINE void write_row(const Quats& real, const BonePoints& translation, BoneVec* row) {
         const BoneTag d;
-        const BonePoints by = times<BoneTag>(hn::Set(d, 0.5), translation);
-        const BonePoints dual = add_scaled<BoneTag>(cross<BoneTag>(by, real.v), real.w, by);
+        const BonePoints half = times<BoneTag>(hn::Set(d, 0.5), translation);
+        const BonePoints dual = add_scaled<BoneTag>(cross<BoneTag>(half, real.v), real.w, half);
         row[0] = real.w;
         row[1] = real.v.x;
         row[2] = real.v.y;
         row[3] = real.v.z;
-        row[4] = hn::Neg(dot<BoneTag>(by, real.v));
+        row[4] = hn::Neg(dot<BoneTag>(half, real.v));
         row[5] = dual.x;
         row[6] = dual.y;
         row[7] = dual.z;

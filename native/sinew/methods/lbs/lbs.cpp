@@ -100,17 +100,21 @@ HWY_INLINE void add_bone(D d, const Bone& bone, const Vec<D>* weight, const Poin
     add_along<kVectors, kWeighted>(d, bone, 2, &Points<D>::z, weight, p, sum);
 }
 
+/// The columns of the base of an absolute sum.
+alignas(16) inline constexpr float kNoColumns[kColumns] = {};
+
 /// Deforms lanes [lane, lane + kVectors * N) of block `b`, whose vertices have the same bones.
 ///
-/// rest      its rest points from these lanes on, kLanes apart
-/// weights   its weights from these lanes on, kLanes apart, without those of the first bone
-/// first     columns of the first bone
-/// other_of  other_of(k) is the difference of the k-th bone from the first; if kAbsolute, the k-th bone
-/// kCount    the number of influences, or 0 for `count`
-template <std::size_t kCount, std::size_t kVectors, bool kAbsolute, class D, class OtherOf>
-HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointers, std::size_t b,
-                             std::size_t lane, const float* rest, const float* weights, std::size_t count,
-                             const float* first, const OtherOf& other_of) {
+/// rest          its rest points from these lanes on, kLanes apart
+/// first_weight  null, or the weights of the first of the others, which `weights` then lacks
+/// weights       of the others from these lanes on, kLanes apart
+/// first         columns of the first bone, or kNoColumns
+/// other_of      other_of(k) is the difference of the k-th bone from the first; for kNoColumns, bone k - 1
+/// kCount        the number of bones, that of kNoColumns included, or 0 for `count`
+template <std::size_t kCount, std::size_t kVectors, class D, class OtherOf>
+HWY_INLINE void deform_lanes(D d, const MeshPointers& pointers, std::size_t b, std::size_t lane,
+                             const float* rest, const float* first_weight, const float* weights,
+                             std::size_t count, const float* first, const OtherOf& other_of) {
     const std::size_t step = hn::Lanes(d);
     Points<D> p[kVectors];
     Points<D> sum[kVectors];
@@ -118,15 +122,12 @@ HWY_INLINE void deform_lanes(D d, const Frame& frame, const MeshPointers& pointe
     for (std::size_t v = 0; v < kVectors; ++v, rest += step) {
         sum[v] = p[v] = {hn::Load(d, rest), hn::Load(d, rest + kLanes), hn::Load(d, rest + 2 * kLanes)};
     }
-    if constexpr (kAbsolute) {
-        for (std::size_t v = 0; v < kVectors; ++v) {
-            weight[v] = hn::Load(d, first_weights_of(frame, b) + lane + v * step);
-        }
-    }
-    add_bone<kVectors, kAbsolute>(d, Columns{first}, weight, p, sum);
+    add_bone<kVectors, false>(d, Columns{first}, weight, p, sum);
     for (std::size_t k = 1; k < (kCount > 0 ? kCount : count); ++k) {
-        for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, weights + v * step));
-        weights += kLanes;
+        const bool is_apart = kCount == 0 && k == 1 && first_weight != nullptr;
+        const float* const from = is_apart ? first_weight : weights;
+        for (std::size_t v = 0; v < kVectors; ++v) weight[v] = in_register(hn::Load(d, from + v * step));
+        if (!is_apart) weights += kLanes;
         add_bone<kVectors, true>(d, other_of(k), weight, p, sum);
     }
     for (std::size_t v = 0; v < kVectors; ++v) store_points(d, pointers, b, lane + v * step, sum[v]);
@@ -136,25 +137,27 @@ HWY_INLINE const float* columns_of_bone(const Frame& frame, std::int32_t bone) {
     return frame.palette->bones[kLbsColumns * static_cast<std::size_t>(bone)].value.data();
 }
 
-template <std::size_t kCount, bool kAbsolute, class OtherOf>
+template <std::size_t kCount, class OtherOf>
 HWY_INLINE void deform_each(const Frame& frame, std::size_t begin, std::size_t end, const float* first,
                             const OtherOf& other_of) {
     const Full d;
     // Broadcasting each of a bone's numbers once for two vectors saves a quarter of the time on AVX2.
     constexpr std::size_t kVectors = hn::MaxLanes(Full()) < kLanes ? 2 : 1;
     const MeshPointers pointers = pointers_of(frame);
-    const std::size_t count = kCount > 0 ? kCount : pointers.blocks[begin].influences;
+    const bool is_absolute = kCount == 0 && first == kNoColumns;
+    const std::size_t influences = kCount > 0 ? kCount : pointers.blocks[begin].influences;
     // The data of these blocks is contiguous. Finding it anew for each takes 3 % more instructions.
     const float* rest = pointers.rest_points[kPointRows * begin].lane.data();
     const float* weights = weights_of(pointers, begin);
     for (std::size_t b = begin; b < end; ++b) {
         const std::size_t lanes = lanes_end(d, pointers.blocks[b]);
         for (std::size_t lane = 0; lane < lanes; lane += kVectors * hn::Lanes(d)) {
-            deform_lanes<kCount, kVectors, kAbsolute>(d, frame, pointers, b, lane, rest + lane,
-                                                      weights + lane, count, first, other_of);
+            deform_lanes<kCount, kVectors>(
+                d, pointers, b, lane, rest + lane, is_absolute ? first_weights_of(frame, b) + lane : nullptr,
+                weights + lane, influences + (is_absolute ? 1 : 0), first, other_of);
         }
         rest += kLanes * kPointRows;
-        weights += kLanes * (count - 1);
+        weights += kLanes * (influences - 1);
     }
 }
 
@@ -165,7 +168,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const float* const first = columns_of_bone(frame, bones[0]);
     // Stored differences can not be loaded again at once; for a single block this takes longer than it saves.
     if (kCount == 0 || end - begin == 1) {
-        return deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
+        return deform_each<kCount>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
             return Differences{columns_of_bone(frame, bones[k]), first};
         });
     }
@@ -178,16 +181,15 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
                       columns + kColumns * k + i);
         }
     }
-    deform_each<kCount, false>(frame, begin, end, first, [&](std::size_t k) HWY_ATTR {
-        return Columns{loaded_anew(columns + kColumns * k)};
-    });
+    deform_each<kCount>(frame, begin, end, first,
+                        [&](std::size_t k) HWY_ATTR { return Columns{loaded_anew(columns + kColumns * k)}; });
 }
 
 /// Deforms blocks [begin, end) with the same bones, by their absolute sum (Palette).
 inline void deform_absolute_set(const Frame& frame, std::size_t begin, std::size_t end) {
     const std::int32_t* const bones = &frame.mesh->bones[frame.mesh->blocks[begin].first_bone];
-    deform_each<0, true>(frame, begin, end, columns_of_bone(frame, bones[0]),
-                         [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k])}; });
+    deform_each<0>(frame, begin, end, kNoColumns,
+                   [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k - 1])}; });
 }
 
 #if HWY_TARGET != HWY_SCALAR
@@ -197,7 +199,6 @@ inline void deform_absolute_set(const Frame& frame, std::size_t begin, std::size
 /// rest     the vertex's rest point: numbers kLanes apart
 /// weights  its weights: numbers kLanes apart
 /// to       the vertex's point
-template <bool kAbsolute>
 HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std::size_t count,
                               const float* rest, const float* weights, Vec3<float>* to) {
     const Four four;
@@ -211,16 +212,15 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
     // Not through memory: a vector load of something just stored in parts has to wait for it.
     V4 sum = hn::IfThenElse(hn::FirstN(four, 1), x, hn::IfThenElse(hn::FirstN(four, 2), y, z));
     V4 first[kLbsColumns];
-    const float* const stored_first = columns_of_bone(frame, bones[0]);
+    const bool is_absolute = is_summed_absolutely(*frame.palette, bones, count);
+    const float* const stored_first = is_absolute ? kNoColumns : columns_of_bone(frame, bones[0]);
     for (std::size_t c = 0; c < kLbsColumns; ++c) first[c] = hn::Load(four, stored_first + 4 * c);
-    const V4 by_first = moved_by(first);
-    sum = kAbsolute ? hn::MulAdd(hn::Set(four, weights[0]), by_first, sum) : hn::Add(by_first, sum);
-    for (std::size_t k = 1; k < count; ++k) {
+    sum = hn::Add(moved_by(first), sum);
+    for (std::size_t k = is_absolute ? 0 : 1; k < count; ++k) {
         const float* const stored = columns_of_bone(frame, bones[k]);
         V4 columns[kLbsColumns];
         for (std::size_t c = 0; c < kLbsColumns; ++c) {
-            columns[c] = hn::Load(four, stored + 4 * c);
-            if (!kAbsolute) columns[c] = hn::Sub(columns[c], first[c]);
+            columns[c] = hn::Sub(hn::Load(four, stored + 4 * c), first[c]);
         }
         sum = hn::MulAdd(hn::Set(four, weights[kLanes * k]), moved_by(columns), sum);
     }
@@ -229,25 +229,14 @@ HWY_INLINE void deform_vertex(const Frame& frame, const std::int32_t* bones, std
     std::memcpy(to, point, sizeof(Vec3<float>));
 }
 
-/// Not inlined, so that its registers do not burden the usual case.
-inline HWY_NOINLINE void deform_vertex_absolutely(const Frame& frame, const std::int32_t* bones,
-                                                  std::size_t count, const float* rest, const float* weights,
-                                                  Vec3<float>* to) {
-    deform_vertex<true>(frame, bones, count, rest, weights, to);
-}
-
 inline void deform_own_bones(const Frame& frame, std::size_t b) {
     const Block& block = frame.mesh->blocks[b];
     const float* const rest = frame.rest_points[kPointRows * b].lane.data();
     const float* const weights = frame.mesh->weights[block.first_weight].lane.data();
     const std::int32_t* bones = &frame.mesh->bones[block.first_bone];
     for (std::size_t lane = 0; lane < block.vertices; ++lane, bones += block.influences) {
-        Vec3<float>* const to = frame.points + frame.mesh->vertices[b].lane[lane];
-        if (is_summed_absolutely(*frame.palette, bones, block.influences)) {
-            deform_vertex_absolutely(frame, bones, block.influences, rest + lane, weights + lane, to);
-        } else {
-            deform_vertex<false>(frame, bones, block.influences, rest + lane, weights + lane, to);
-        }
+        deform_vertex(frame, bones, block.influences, rest + lane, weights + lane,
+                      frame.points + frame.mesh->vertices[b].lane[lane]);
     }
 }
 
@@ -263,15 +252,12 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
         const bool is_absolute = is_summed_absolutely(*frame.palette, bones, block.influences);
         const Points<One> p = load_points(d, pointers, b, lane);
         Points<One> sum = p;
-        const Columns first{columns_of_bone(frame, bones[0])};
-        const Vec<One> weight_of_first = hn::Load(d, weights + lane);
-        is_absolute ? add_bone<1, true>(d, first, &weight_of_first, &p, &sum)
-                    : add_bone<1, false>(d, first, &weight_of_first, &p, &sum);
-        for (std::size_t k = 1; k < block.influences; ++k) {
-            const float* const columns = columns_of_bone(frame, bones[k]);
-            const Vec<One> weight = hn::Load(d, weights + kLanes * k + lane);
-            is_absolute ? add_bone<1, true>(d, Columns{columns}, &weight, &p, &sum)
-                        : add_bone<1, true>(d, Differences{columns, first.columns}, &weight, &p, &sum);
+        const float* const first = is_absolute ? kNoColumns : columns_of_bone(frame, bones[0]);
+        Vec<One> weight = hn::Zero(d);
+        add_bone<1, false>(d, Columns{first}, &weight, &p, &sum);
+        for (std::size_t k = is_absolute ? 0 : 1; k < block.influences; ++k) {
+            weight = hn::Load(d, weights + kLanes * k + lane);
+            add_bone<1, true>(d, Differences{columns_of_bone(frame, bones[k]), first}, &weight, &p, &sum);
         }
         store_points(d, pointers, b, lane, sum);
     }

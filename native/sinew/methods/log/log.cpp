@@ -26,11 +26,11 @@ struct LogKernel {
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D>& sum) {
-        Points<D> by;
-        if (!scaled(d, palette, bone, rest, by)) return;
-        sum.value[4] = hn::MulAdd(weight, by.x, sum.value[4]);
-        sum.value[5] = hn::MulAdd(weight, by.y, sum.value[5]);
-        sum.value[6] = hn::MulAdd(weight, by.z, sum.value[6]);
+        Points<D> added;
+        if (!scaled(d, palette, bone, rest, added)) return;
+        sum.value[4] = hn::MulAdd(weight, added.x, sum.value[4]);
+        sum.value[5] = hn::MulAdd(weight, added.y, sum.value[5]);
+        sum.value[6] = hn::MulAdd(weight, added.z, sum.value[6]);
     }
 
     /// The exponential, as in transform/twist.h.

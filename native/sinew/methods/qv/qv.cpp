@@ -25,9 +25,9 @@ struct QvKernel {
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
                                      const Points<D>& rest, Sum<D>& sum) {
-        Points<D> by;
-        if (!scaled(d, palette, bone, rest, by)) return;
-        const Points<D> rotated = rotated_by(d, row_of(palette, bone), by);
+        Points<D> added;
+        if (!scaled(d, palette, bone, rest, added)) return;
+        const Points<D> rotated = rotated_by(d, row_of(palette, bone), added);
         sum.value[4] = hn::MulAdd(weight, rotated.x, sum.value[4]);
         sum.value[5] = hn::MulAdd(weight, rotated.y, sum.value[5]);
         sum.value[6] = hn::MulAdd(weight, rotated.z, sum.value[6]);

@@ -81,9 +81,9 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
     Points<D> displacement;
     for (std::size_t k = 0; k < 2; ++k) {
         Points<D> moved = sinew::HWY_NAMESPACE::displacement(d, pair.rows[k] + 4, midpoints[k]);
-        Points<D> by;
-        if (scaled(d, palette, pair.bones[k], rest, by))
-            moved = add<D>(moved, rotated_by(d, pair.rows[k], by));
+        Points<D> added;
+        if (scaled(d, palette, pair.bones[k], rest, added))
+            moved = add<D>(moved, rotated_by(d, pair.rows[k], added));
         displacement = k == 0 ? times<D>(weights[0], moved) : add_scaled<D>(displacement, weights[1], moved);
     }
     const Vec<D> first_share = kSlerp ? slerp_weight(d, weights[0], pair.squared_angle) : weights[0];

@@ -3,11 +3,14 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <span>
 #include <string_view>
+#include <vector>
 
 #include "sinew/mesh/influence.h"
 #include "sinew/methods/method_info.h"
+#include "sinew/stages/stage.h"
 #include "sinew/transform/affine.h"
 
 namespace sinew {
@@ -144,6 +147,39 @@ struct BulgeLimitStage {
         if (!(distance > allowed)) return point;
         return point + amount * (T(1) - allowed / distance) * to_bones;
     }
+};
+
+/// What a BulgeLimit is constructed from besides a Binding.
+struct BulgeLimitData {
+    std::span<const BoneSegment<float>> segments;  // [bones] at rest, in the space of posed_from_rest
+    Affine<float> bones_from_model{};              // maps rest points to that space; invertible
+    std::span<const float> weights{};  // [vertices] of the vertex group, clamped to 0 to 1; empty: all 1
+};
+
+/// How to limit one frame.
+struct BulgeLimitOptions {
+    BulgeForm form = BulgeForm::continuous;
+    float strength = 1.0f;  // clamped to 0 to 1; NaN: 1
+    std::size_t threads = 0;
+};
+
+/// The stage `bulge_limit` for one mesh, applied after Deformer::deform().
+class SINEW_EXPORT BulgeLimit : public BoneStage {
+public:
+    /// Shares the memory of `binding`. Throws also for fewer segments than bones, and for a singular transform.
+    BulgeLimit(const Binding& binding, const BulgeLimitData& data);
+
+    /// Limits the points in place.
+    ///
+    /// points  [vertices] deformed, model space
+    /// pose    only its bones are read: the space is that of the rest points
+    ///
+    /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
+    Status apply(std::span<Vec3<float>> points, const Pose& pose,
+                 const BulgeLimitOptions& options = {}) const noexcept;
+
+private:
+    struct State;
 };
 
 }  // namespace sinew

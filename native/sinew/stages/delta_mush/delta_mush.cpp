@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/delta_mush.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 
 #include <algorithm>
 #include <cmath>
@@ -11,7 +11,6 @@
 #include "sinew/base/fork_safe.h"
 #include "sinew/base/thread_pool.h"
 #include "sinew/mesh/check_arrays.h"
-#include "sinew/stages/delta_mush/delta_mush.h"
 #include "sinew/stages/delta_mush/mush_mesh.h"
 
 namespace sinew {
@@ -104,7 +103,7 @@ struct DeltaMush::State {
           kept(vertices + kLanes),
           smoothed{std::vector<Float4>(vertices + kLanes), std::vector<Float4>(vertices + kLanes)} {}
 
-    void bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with);
+    void bind(std::span<const Vec3<float>> points, const DeltaMushSettings& settings);
 
     /// What bind() sets.
     struct Bound {
@@ -116,7 +115,7 @@ struct DeltaMush::State {
     };
 
     /// Smooths smoothed[0]. Returns the index of the result in `smoothed`.
-    std::size_t smooth(const Bound& of, std::size_t threads) const noexcept;
+    std::size_t smooth(const Bound& settings, std::size_t threads) const noexcept;
 
     [[nodiscard]] std::size_t threads_for(std::size_t threads) const noexcept {
         return useful_threads(threads, mesh.vertices.size(), kMushVerticesWorthAThread);
@@ -132,20 +131,20 @@ struct DeltaMush::State {
     mutable std::vector<Float4> smoothed[2];
 };
 
-void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMushSettings& with) {
-    check(points, with, mesh.vertices.size());
-    Amount amount = amount_of(mesh, points, with);
+void DeltaMush::State::bind(std::span<const Vec3<float>> points, const DeltaMushSettings& settings) {
+    check(points, settings, mesh.vertices.size());
+    Amount amount = amount_of(mesh, points, settings);
     amount.factors.resize(mesh.vertices.size() + kLanes);
-    auto made =
-        std::make_unique<Bound>(Bound{with.type, amount.iterations, std::move(amount.factors),
-                                      with.weights.empty() && !with.pin_boundary && with.radius == 0.0f,
-                                      std::vector<MushDetails>(mesh.detail_count)});
-    const float by_type = with.type == SmoothType::length_weighted ? 2.0f : 1.0f;
+    auto made = std::make_unique<Bound>(
+        Bound{settings.type, amount.iterations, std::move(amount.factors),
+              settings.weights.empty() && !settings.pin_boundary && settings.radius == 0.0f,
+              std::vector<MushDetails>(mesh.detail_count)});
+    const float by_type = settings.type == SmoothType::length_weighted ? 2.0f : 1.0f;
     for (const MushRun& run : mesh.runs) {
         for (std::size_t i = run.begin; i < run.end && run.valence > 0; ++i) {
             const float weight =
-                with.weights.empty() ? 1.0f : std::clamp(with.weights[mesh.vertices[i]], 0.0f, 1.0f);
-            const bool is_pinned = with.pin_boundary && mesh.on_boundary[i] != 0;
+                settings.weights.empty() ? 1.0f : std::clamp(settings.weights[mesh.vertices[i]], 0.0f, 1.0f);
+            const bool is_pinned = settings.pin_boundary && mesh.on_boundary[i] != 0;
             made->factors[i] *= is_pinned ? 0.0f : by_type * weight / static_cast<float>(run.valence);
         }
     }
@@ -224,24 +223,25 @@ private:
     std::size_t most_;
 };
 
-std::size_t DeltaMush::State::smooth(const Bound& of, std::size_t threads) const noexcept {
+std::size_t DeltaMush::State::smooth(const Bound& settings, std::size_t threads) const noexcept {
     if (mesh.vertices.empty()) return 0;
-    const bool by_length = of.type == SmoothType::length_weighted;
+    const bool by_length = settings.type == SmoothType::length_weighted;
     const auto smooth_chunk =
         (by_length ? kMushKernel.smooth_by_length : kMushKernel.smooth)[target_in_use()];
     const Iterations together(mesh, threads);
-    for (std::size_t first = 0; first < of.iterations; first += together.most()) {
-        together.run(std::min(together.most(), of.iterations - first), [&](std::size_t i, std::size_t chunk) {
-            const std::size_t from = (first + i) % 2;
-            const MushFrame frame{.mesh = &mesh,
-                                  .from = smoothed[from].data(),
-                                  .to = smoothed[1 - from].data(),
-                                  .factors = of.factors.data(),
-                                  .is_uniform = of.is_uniform};
-            smooth_chunk(frame, chunk, chunk + 1);
-        });
+    for (std::size_t first = 0; first < settings.iterations; first += together.most()) {
+        together.run(std::min(together.most(), settings.iterations - first),
+                     [&](std::size_t i, std::size_t chunk) {
+                         const std::size_t from = (first + i) % 2;
+                         const MushFrame frame{.mesh = &mesh,
+                                               .from = smoothed[from].data(),
+                                               .to = smoothed[1 - from].data(),
+                                               .factors = settings.factors.data(),
+                                               .is_uniform = settings.is_uniform};
+                         smooth_chunk(frame, chunk, chunk + 1);
+                     });
     }
-    return of.iterations % 2;
+    return settings.iterations % 2;
 }
 
 DeltaMush::DeltaMush(const MeshTopology& topology, std::span<const Vec3<float>> rest_points,
@@ -268,12 +268,12 @@ Status DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t 
     threads = state.threads_for(threads);
     // Read once, because the compiler assumes that any stored number may change it.
     const auto gather = [&, from = points.data()](std::size_t begin, std::size_t end) {
-        const std::uint32_t* const of = mesh.vertices.data();
+        const std::uint32_t* const vertices = mesh.vertices.data();
         Float4* const to = state.smoothed[0].data();
         end = std::min(end * MushMesh::kChunk, mesh.vertices.size());
         for (std::size_t i = begin * MushMesh::kChunk; i < end; ++i) {
             // The fourth number is always 0.
-            std::memcpy(&to[i], &from[of[i]], sizeof(Vec3<float>));
+            std::memcpy(&to[i], &from[vertices[i]], sizeof(Vec3<float>));
         }
     };
     parallel_for(mesh.chunk_count(), threads, gather, 1);

@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "sinew/base/targets.h"
-#include "sinew/delta_mush.h"
 #include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/stages/delta_mush/delta_mush.h"
 
 namespace sinew {
 

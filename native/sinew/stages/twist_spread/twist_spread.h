@@ -3,11 +3,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstddef>
 #include <cstdint>
 #include <numbers>
+#include <span>
 #include <string_view>
+#include <vector>
 
 #include "sinew/methods/method_info.h"
+#include "sinew/stages/stage.h"
 #include "sinew/transform/affine.h"
 #include "sinew/transform/rotation.h"
 
@@ -171,8 +175,8 @@ struct TwistSpreadStage {
         const T e = share(bone.head, bone.tail, bone.curve, rest);
         const T turns = mask * bone.angle * (bone.is_from_parent ? e - T(1) : e);
         // With the bone's matrix M, linear blending by M R(turns) instead of M.
-        const Vec3<T> own = bone.motion.linear * spun(bone.origin, bone.axis, turns, rest);
-        if (blend == TwistBlend::linear) return weight * own;
+        const Vec3<T> linear = bone.motion.linear * spun(bone.origin, bone.axis, turns, rest);
+        if (blend == TwistBlend::linear) return weight * linear;
         const Vec3<T> posed_axis = bone.motion.linear * bone.axis;
         const T length = glm::length(posed_axis);
         if (!(length > T(0))) return Vec3<T>(T(0));
@@ -181,10 +185,10 @@ struct TwistSpreadStage {
         const Vec3<T> axis =
             (glm::determinant(bone.motion.linear) < T(0) ? T(-1) : T(1)) / length * posed_axis;
         const T missing = missing_turns(blend, bone.around, below, mask * bone.part);
-        const Vec3<T> by = spun(origin, axis, weight * turns + missing, point);
-        if (!bone.is_scaled) return by;
+        const Vec3<T> rotated = spun(origin, axis, weight * turns + missing, point);
+        if (!bone.is_scaled) return rotated;
         // A scaled bone keeps its scaled shape: a vertex of this bone alone is moved by M R(turns).
-        return by + weight * (own - spun(origin, axis, turns, transform_point(bone.motion, rest)));
+        return rotated + weight * (linear - spun(origin, axis, turns, transform_point(bone.motion, rest)));
     }
 
     /// The vertex after twisting by one bone. Call per bone, in reverse order of TwistSpreadData::twists.
@@ -202,6 +206,56 @@ struct TwistSpreadStage {
         return point + (T(1) - mix) * added(bone, blend, weight, below, mask, rest, point) +
                mix * added(bone, mix_blend, weight, below, mask, rest, point);
     }
+};
+
+/// What a TwistSpread is constructed from besides a Binding.
+struct TwistSpreadData {
+    std::span<const TwistBone> twists;  // each bone at most once, a bone before those that it carries
+    // [bones] at rest, Y along the bone, in the space of posed_from_rest
+    std::span<const Affine<float>> rest_bones;
+    std::span<const std::int32_t> parents{};  // [bones] of each bone, -1 for none; empty: none has one
+    Affine<float> bones_from_model{};         // maps rest points to that space; invertible
+    std::span<const float> weights{};  // [vertices] of the vertex group, clamped to 0 to 1; empty: all 1
+    std::span<const float> mix{};      // [vertices] those of the stage `mix`; empty: all 0
+};
+
+/// How to spread the twists of one frame.
+struct TwistSpreadOptions {
+    float amount = 1.0f;  // clamped to 0 to 1; NaN: 1
+    std::span<const float>
+        amounts{};  // [twists] further factors, one for each bone, clamped to 0 to 1; NaN: 1
+    std::span<const float> curves{};  // [twists] clamped to -1 to 1; NaN: 0
+    // [twists] the channels of each tip; empty: unknown
+    std::span<const TwistChannels<float>> channels{};
+    TwistBlend blend = TwistBlend::linear;      // of the method that made the points
+    TwistBlend mix_blend = TwistBlend::linear;  // of the second, where `mix` is above 0
+    std::size_t threads = 0;
+};
+
+/// The stage `twist_spread` for one mesh, applied after Deformer::deform() and before all other stages.
+class SINEW_EXPORT TwistSpread : public BoneStage {
+public:
+    /// Shares the memory of `binding`. Throws also for bones beyond rest_bones, a bone that is listed twice, rest bones
+    /// without a Y axis, and a singular transform.
+    TwistSpread(const Binding& binding, const TwistSpreadData& data);
+
+    [[nodiscard]] std::size_t twist_count() const noexcept;
+
+    /// The twist of each tip in a pose, radians [twists], with fades and turns, without amounts.
+    [[nodiscard]] std::vector<float> angles(const Pose& pose,
+                                            std::span<const TwistChannels<float>> channels = {}) const;
+
+    /// Spreads the twists in place.
+    ///
+    /// points  [vertices] deformed, model space
+    /// pose    only its bones are read: the space is that of the rest points
+    ///
+    /// Where no bone is twisted, no bit changes.
+    Status apply(std::span<Vec3<float>> points, const Pose& pose,
+                 const TwistSpreadOptions& options = {}) const noexcept;
+
+private:
+    struct State;
 };
 
 }  // namespace sinew

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects splines at their ends and cuts, skeletons' keyframes, and what these refuse.
+"""Protects splines at their ends and cuts, and skeletons without bones.
 exact_interpolation.py has the oracles."""
 
 import numpy as np
@@ -40,16 +40,6 @@ def test_signs_along_a_spline_go_from_key_to_key(method):
     # As each step is equal, the middle of the middle one is known.
     middle = catmull_rom(layout(motions[:4], name), steps[:4], 1.5, method).transforms
     close(matrix(middle, name)[:3, :3], Rotation.from_rotvec(turns[1].as_rotvec() * 1.5).as_matrix())
-
-
-def test_skeletons_take_times_of_any_shape():
-    keys = layout(rigid(np.random.default_rng(32), 9), "dual_quat").reshape(3, 3, 8)
-    skeleton, t = sinew.Skeleton([-1, 0, 1]), np.array([[0.0, 0.3], [0.7, 1.0]])
-    transforms, is_defined = skeleton.interpolate(keys[0], keys[1], t)
-    one, defined = skeleton.interpolate(keys[0], keys[1], 0.3)
-    assert isinstance(defined, bool)
-    assert is_defined.shape == (2, 2)
-    np.testing.assert_array_equal(transforms[0, 1], one)
 
 
 def test_empty_skeleton_works():
