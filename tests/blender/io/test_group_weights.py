@@ -157,3 +157,13 @@ def test_a_blender_whose_memory_is_not_known_is_read_vertex_by_vertex(monkeypatc
     monkeypatch.setattr(mesh_memory, "OFFSETS", {})
     assert mesh_memory.address_of_groups(obj.data) is None
     read_alike(obj.data)
+
+
+def test_reading_copies_nothing():
+    """A mesh shares its groups with its evaluated copy, until somebody looks at one vertex."""
+    obj = a_grid(4)
+    weigh_at_random(obj, 5, 1)
+    bpy.context.view_layer.update()
+    address = mesh_memory.address_of_groups(obj.data)
+    mesh_io.read_group_weights(obj.data)
+    assert mesh_memory.address_of_groups(obj.data) == address
