@@ -64,8 +64,8 @@ void def_bones(py::class_<Timed<Stage>>& type) {
     type.def_property_readonly("bone_count", &Stage::bone_count, "How many bones a pose must have.")
         .def(
             "set_rest_points", &set_rest_points<Stage>, "rest_points"_a, "bones_from_model"_a = py::none(),
-            R"(Sets other rest points, float32 [vertices, 3], or another space of the bones, which takes about as long
-as apply().)");
+            R"(Sets other rest points, float32 [vertices, 3], and the space of the bones: None is the identity, whatever
+was set before.)");
 }
 
 }  // namespace sinew::bindings

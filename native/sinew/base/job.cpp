@@ -178,8 +178,9 @@ bool BackgroundJob::wait_for(std::chrono::milliseconds time) const {
 }
 
 void BackgroundJob::rethrow() const {
-    if (state_->error && state_->has_ended.load(std::memory_order_acquire))
+    if (state_->has_ended.load(std::memory_order_acquire) && state_->error) {
         std::rethrow_exception(state_->error);
+    }
 }
 
 }  // namespace sinew

@@ -16,9 +16,9 @@ namespace sinew {
 /// are not those of parallel_for(), which frames need meanwhile.
 class SINEW_EXPORT Job {
 public:
-    /// threads    at most so many share the work; 0: as many as useful
+    /// threads       at most so many share the work; 0: as many as useful
     /// low_priority  whether threads that it starts have a lower priority, and work half of the time while frames are
-    ///            deformed; on a busy machine the work then takes much longer
+    ///               deformed; on a busy machine the work then takes much longer
     explicit Job(std::size_t threads = 0, bool low_priority = false) noexcept;
 
     // For any thread.
@@ -45,7 +45,8 @@ private:
     std::atomic<bool> is_cancelled_{false};
 };
 
-/// A job on a thread of its own, from the constructor on. A forked child finds it ended.
+/// A job on a thread of its own, from the constructor on; where none can be started, the constructor does the work. A
+/// forked child finds it ended.
 class SINEW_EXPORT BackgroundJob {
 public:
     BackgroundJob(std::size_t threads, bool low_priority, std::function<void(Job&)> work);

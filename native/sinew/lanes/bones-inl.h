@@ -155,7 +155,8 @@ void rigid_bone_rows(const Bones& all, Palette& palette) {
     }
 }
 
-/// What methods have in common that rotate a vertex about a point which the bones move. A row is the rotation (w, x, y, z), then the displacement rows of the motion.
+/// What methods have in common that rotate a vertex about a point which the bones move. A row is the rotation
+/// (w, x, y, z), then the displacement rows of the motion.
 struct CentreRows {
     static constexpr std::size_t kNumbers = 16;
 

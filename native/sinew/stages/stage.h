@@ -15,10 +15,10 @@ namespace sinew {
 /// A stage that follows the blend and reads the bones of a mesh. Each such stage adds its apply().
 class SINEW_EXPORT BoneStage {
 public:
-    /// Sets other rest points [vertices], or the same points with another bones_from_model. Takes about as long as
-    /// apply(). The first call allocates memory for the points.
+    /// Sets other rest points [vertices] and their space. The first call allocates memory for the points. After a
+    /// fork, repeat a call that was in progress.
     ///
-    /// bones_from_model  invertible
+    /// bones_from_model  invertible; not given: the identity, whatever was set before
     Status set_rest_points(std::span<const Vec3<float>> rest_points,
                            const Affine<float>& bones_from_model = {}) noexcept;
 

@@ -353,8 +353,8 @@ class TwistSpread:
         Where no bone is twisted, no bit changes.
         """
     def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
-        """Sets other rest points, float32 [vertices, 3], or another space of the bones, which takes about as long
-        as apply().
+        """Sets other rest points, float32 [vertices, 3], and the space of the bones: None is the identity, whatever
+        was set before.
         """
     @property
     def bone_count(self) -> int:
@@ -390,8 +390,8 @@ class BulgeLimit:
         bone allows a distance larger by the largest factor by which it stretches vectors perpendicular to it.
         """
     def set_rest_points(self, rest_points: numpy.typing.ArrayLike, bones_from_model: numpy.typing.ArrayLike | None = None) -> None:
-        """Sets other rest points, float32 [vertices, 3], or another space of the bones, which takes about as long
-        as apply().
+        """Sets other rest points, float32 [vertices, 3], and the space of the bones: None is the identity, whatever
+        was set before.
         """
     @property
     def bone_count(self) -> int:
@@ -476,19 +476,12 @@ def stages() -> tuple[Stage, ...]:
 def thread_id() -> int:
     """A number that no other thread has as long as this one runs."""
 def weights_in_memory(address: typing.SupportsInt | typing.SupportsIndex, vertices: typing.SupportsInt | typing.SupportsIndex) -> tuple:
-    """Read the vertex groups of a mesh from the memory of Blender, in whose process this runs.
+    """The vertex groups of a mesh, read from the memory of the Blender that this runs in: int32 [vertices], how
+    many entries each vertex has; int32 [entries], the group of each, in the order of the vertices and as stored; float32
+    [entries], its weight. ValueError where this can be no such memory.
 
-    Args:
-        address: that of the first of the mesh's MDeformVert, as many as it has vertices. Nothing can check it: with
-            another one the process crashes.
-        vertices: how many.
-
-    Returns:
-        int32 [vertices], the entries of each vertex; int32 [entries], the group of each, in the order of the
-        vertices and as stored; float32 [entries], its weight.
-
-    Raises:
-        ValueError: the address is 0, or not aligned.
+    address   of the mesh's MDeformVert array, one for each vertex; a wrong one crashes the process or gives garbage
+    vertices  how many
     """
 __compiled_in__: str
 __version__: str

@@ -161,7 +161,7 @@ struct DeltaMushSettings {
 };
 
 /// The stage `delta_mush` (Mancewicz et al. 2014), as Blender's Corrective Smooth with the rest source Original
-/// Coordinates: see stages/delta_mush/delta_mush.h. Takes any polygons, edges without faces, and edges of many faces.
+/// Coordinates; DeltaMushStage defines it. Takes any polygons, edges without faces, and edges of many faces.
 class SINEW_EXPORT DeltaMush {
 public:
     /// Throws also for sizes that exceed the limits, indices of vertices that do not exist, an edge of a face that is
