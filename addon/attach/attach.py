@@ -194,8 +194,8 @@ def notes(obj: bpy.types.Object) -> list[str]:
     and on what it switched off itself."""
     found = []
     settings = properties.of(obj)
-    is_animated = any(is_volume_followed(obj, skin) for skin in layout.read(obj).skins)
-    if settings.method in MODIFIERS_OWN and is_animated:
+    is_keyed = any(is_volume_followed(obj, skin) for skin in layout.read(obj).skins)
+    if settings.method in MODIFIERS_OWN and is_keyed:
         text = "Its Preserve Volume is animated, and chooses between Linear Blend and Dual Quaternion"
         found.append(phrase(text))
     if undeformed.was_switched(obj):

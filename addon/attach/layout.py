@@ -25,12 +25,12 @@ MARK_NAME = "Sinew Stack Mark"
 class Armature(NamedTuple):
     """How an Armature modifier is set. What keys or drivers set is not here: it differs in each evaluation.
 
-    armature  the session_uid of its armature; 0 for none
-    method    its own, as from method_of(); empty where Preserve Volume is animated
-    options   those that Sinew reproduces; None where one of them is animated
+    uid      the session_uid of its armature; 0 for none
+    method   its own, as from method_of(); empty where Preserve Volume is animated
+    options  those that Sinew reproduces; None where one of them is animated
     """
 
-    armature: int
+    uid: int
     method: str
     options: ModifierOptions | None
 
@@ -143,7 +143,7 @@ class Layout:
         viewport, render = (
             Icons(
                 self.own_icons[view] or keyed[view],
-                tuple(skin.shown[view] or any(skin.keyed) for skin in self.skins),
+                tuple(skin.shown[view] or skin.keyed[view] for skin in self.skins),
             )
             for view in range(2)
         )
@@ -168,8 +168,8 @@ class Layout:
         return self.is_deforming_body or (self.mode in PAINT_MODES and makes_another)
 
     def has_switches_of(self, obj: bpy.types.Object) -> bool:
-        """Whether modifiers have the same names and are on and off as they are now. Tells what a pose can be
-        listed with (Changes.of_poses) in less time than another layout."""
+        """Whether names, icons and levels are as they are now: all that can differ where Blender lists only a
+        pose (Changes.of_poses)."""
         return len(self.modifiers) == len(obj.modifiers) and all(
             known.name == now.name
             and known.shown == (now.show_viewport, now.show_render)
@@ -309,7 +309,7 @@ def _start(obj: bpy.types.Object, modifiers: tuple[Modifier, ...], own: set[str]
     with an armature, preferably one that is on."""
     count = len(modifiers)
     if not properties.has_sinew(obj):
-        found = [n for n, m in enumerate(modifiers) if m.armature is not None and m.armature.armature]
+        found = [n for n, m in enumerate(modifiers) if m.armature is not None and m.armature.uid]
         return min(found, key=lambda number: not modifiers[number].can_be_on, default=count)
     behind_own = max((n for n, m in enumerate(modifiers) if m.name in own), default=count) + 1
     kept = (find(modifiers, "ARMATURE", each) for each in properties.of(obj).replaced_modifiers)
@@ -324,14 +324,15 @@ def _start(obj: bpy.types.Object, modifiers: tuple[Modifier, ...], own: set[str]
     while ahead >= 0 and modifiers[ahead].name in own:
         ahead -= 1
     # So do others in place of those that are gone, if Sinew's is behind them.
-    while ahead >= 0 and _is_new(modifiers[ahead], are_gone=not known):
+    while ahead >= 0 and _joins(modifiers[ahead], are_gone=not known):
         start, ahead = ahead, ahead - 1
     return start
 
 
-def _is_new(modifier: Modifier, are_gone: bool) -> bool:
-    armature = modifier.armature
-    return armature is not None and (are_gone or (armature.armature != 0 and modifier.is_on))
+def _joins(modifier: Modifier, are_gone: bool) -> bool:
+    """Whether one directly in front of those that Sinew replaces, or in place of them, is replaced, too."""
+    skin = modifier.armature
+    return skin is not None and (are_gone or (skin.uid != 0 and modifier.can_be_on))
 
 
 def find(

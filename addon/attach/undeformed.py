@@ -39,10 +39,10 @@ def ensure(obj: bpy.types.Object) -> dict[str, object]:
     _ensure_mark(obj, now)
     if not (now.neutral and now.mark):
         now = layout.read(obj)
-    can_mark = _can_mark(obj) and not loses_marks(obj, stack.position_own(obj, now))
-    keeps = properties.of(obj).before.adds_rest_position or not can_mark
+    is_marked = can_mark(obj) and not loses_marks(obj, stack.position_own(obj, now))
+    keeps = properties.of(obj).before.adds_rest_position or not is_marked
     return {
-        node_group.IS_MARKED: can_mark,
+        node_group.IS_MARKED: is_marked,
         node_group.MARK_TO_REMOVE: "" if keeps else node_group.REST_POSITION,
     }
 
@@ -143,7 +143,7 @@ def was_switched(obj: bpy.types.Object) -> bool:
 def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     """Switches Add Rest Position on, or back to what the artist chose, also meanwhile."""
     before = properties.of(obj).before
-    is_marked = is_marked and _can_mark(obj)
+    is_marked = is_marked and can_mark(obj)
     if not before.marks_rest and not is_marked:
         return
     own = adds_rest_position(obj)
@@ -159,7 +159,8 @@ def adds_rest_position(obj: bpy.types.Object) -> bool:
     return obj.add_rest_position_attribute and (before.adds_rest_position or not before.marks_rest)
 
 
-def _can_mark(obj: bpy.types.Object) -> bool:
+def can_mark(obj: bpy.types.Object) -> bool:
+    """Whether Add Rest Position can be on for Sinew's marks."""
     # Blender's would replace one of the artist's.
     return mesh_io.find_attribute(obj.data, node_group.REST_POSITION) is None
 

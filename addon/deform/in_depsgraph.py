@@ -90,6 +90,9 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mode, or the users of its mesh, changed"
     if [armature is None for _replaced, armature in modifiers] != [not uid for uid in bound.armatures]:
         return "its Armature modifiers changed"
+    names = (skinned.noted.layout.sinew, *(replaced.name for replaced, _armature in modifiers))
+    if not all(name in evaluated.modifiers for name in names):
+        return "its modifiers were renamed"
     if skinned.noted.are_options_keyed and bound.options != [
         ModifierOptions.read(evaluated.modifiers[replaced.name]) for replaced, _armature in modifiers
     ]:

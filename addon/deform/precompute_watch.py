@@ -30,7 +30,7 @@ def check() -> float | None:
     if phase.is_saving or phase.is_rendering:
         return SECONDS
     has_ended = is_outdated = False
-    # Asked before the objects are, so that what ends in between is looked at once more.
+    # Read first: a run that ends meanwhile gets another check.
     was_running = bool(precomputations.running)
     for obj, skinned in list(current.pairs):
         try:

@@ -114,7 +114,9 @@ def react(facts: Facts, known: Known) -> Action:
 
 
 def _read(facts: Facts, known: Known) -> Action:
-    if not known.is_bound or (known.is_planned and facts.has_other_modifiers):
+    # In a render, keys may set other options while plans wait.
+    may_be_other = known.is_planned or not facts.may_change
+    if not known.is_bound or (may_be_other and facts.has_other_modifiers):
         return Action.REBIND
     # While a shape key's slider moves, weights are read only at the next event.
     has_other_mesh = facts.has_other_mesh and not facts.is_slider_moved
@@ -125,6 +127,6 @@ def _read(facts: Facts, known: Known) -> Action:
 
 def _show(facts: Facts, known: Known) -> Action:
     if known.plan.is_in_depsgraph:
-        is_asked = facts.was_skipped or facts.lacks_points or known.differs
-        return Action.TAG if is_asked else Action.NOTHING
+        is_due_again = facts.was_skipped or facts.lacks_points or known.differs
+        return Action.TAG if is_due_again else Action.NOTHING
     return Action.WRITE if known.plan.is_written else Action.NOTHING

@@ -80,6 +80,7 @@ class Evaluation:
     def fail(self, error: Exception) -> None:
         if isinstance(error, SinewError):
             self.user_error = error
+        self.mesh = 0
         self.note_failure(f"{type(error).__name__}: {error}")
 
     def note_failure(self, failure: str) -> None:
@@ -339,6 +340,8 @@ def _own_facts(obj: bpy.types.Object, now: Layout) -> list:
         obj.instance_type,
         keys is None or keys.use_relative,
         settings.before.smooth.name,
+        obj.add_rest_position_attribute,
+        undeformed.can_mark(obj),
     ]
     if settings.storage.upstream_proxy is not None:
         state.append(upstream_proxy.signature(obj, now))

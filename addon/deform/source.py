@@ -92,7 +92,7 @@ class Source:
 
     def make_normals(self) -> None:
         """Prepares the normals. Otherwise the first frame would, which takes as long as several frames."""
-        assert self.normals is not None
+        _made = self.normals
 
     @cached_property
     def normals(self) -> SurfaceNormals:

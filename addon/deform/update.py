@@ -23,7 +23,7 @@ from .skinned_object import Noted, SkinnedObject
 MAX_GROUP_LOSSES = 2
 # How often in a row Sinew may fail to deform a mesh within Blender's evaluation and still try again there.
 MAX_FAILURES_IN_A_ROW = 1
-# The failure where Blender never asks.
+# The failure where the driver never requests the points.
 NOT_REQUESTED = "Blender did not request the points"
 
 
@@ -255,7 +255,7 @@ class _Event:
         """Whether the plan stays, and so does what it was applied to: choosing a method changes no
         modifier."""
         skinned, obj = self.skinned, self.obj
-        if skinned is None or new != self.old or not new.is_in_depsgraph or not properties.of(obj).enabled:
+        if skinned is None or new != self.old or not new.is_in_depsgraph:
             return False
         is_only_due = facts.is_due and replace(facts, is_due=False).calls_for_plan is False
         return is_only_due and skinned.is_as_noted(obj, self.layout) and skinned.has_same_surroundings(obj)

@@ -198,6 +198,23 @@ def test_the_artists_own_attribute_of_that_name_stays(rendered):
     assert not obj.add_rest_position_attribute
 
 
+def test_what_marks_the_mesh_changes_while_sinew_is_on(route):
+    """Add Rest Position is switched off, then the mesh gets an attribute of that name."""
+    obj, _armature = scenes.make_arm()
+    bpy.context.scene.frame_set(9)
+    expected = scenes.final_points(obj)
+    scenes.add_sinew(obj, "lbs")
+    obj.add_rest_position_attribute = False
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5
+    obj.data.attributes.new("rest_position", "FLOAT_VECTOR", "POINT")
+    obj.data.update()
+    bpy.context.view_layer.update()
+    obj.sinew.method = "lbs"
+    assert not obj.add_rest_position_attribute
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-5
+
+
 def test_the_modifier_is_made_again_and_follows(rendered):
     obj, _armature = scenes.make_arm()
     expected = rendered(obj)

@@ -477,3 +477,14 @@ def test_keys_that_two_objects_share_go_with_the_last(route):
     for each in (obj, other):
         assert not actions.animated_paths(each)
         assert not each.is_property_set("sinew")
+
+
+@pytest.mark.parametrize("name", ["Sinew", "Armature"])
+def test_a_renamed_modifier_is_no_failure(name, route):
+    obj, _armature = scenes.skinned_arm()
+    bpy.context.scene.frame_set(9)
+    expected = scenes.final_points(obj)
+    obj.modifiers[name].name = "Another"
+    bpy.context.view_layer.update()
+    assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
+    assert session.state_of(obj).evaluation.failures == 0

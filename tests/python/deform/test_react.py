@@ -44,6 +44,7 @@ TABLE = [
     (EVALUATION, SEEN, {"have_bones_changed": True, "is_slider_moved": True}, Action.READ),
     (EVALUATION, SEEN, {"lacks_surface": True}, Action.READ),
     (EVALUATION, SEEN, {"has_other_modifiers": True}, Action.SETTLE),
+    (EVALUATION, SEEN, {"has_other_modifiers": True, "may_change": False}, Action.REBIND),
     (
         EVALUATION,
         {**SEEN, **PLANNED},
