@@ -51,8 +51,9 @@ py::tuple weights_in_memory(std::uintptr_t address, std::size_t vertex_count) {
 }  // namespace
 
 void bind_weights(py::module_& m) {
-    m.def("weights_in_memory", weights_in_memory, py::arg("address"), py::arg("vertices"),
-          R"(The vertex groups of a mesh, read from the memory of the Blender that this runs in: int32 [vertices], how
+    m.def(
+        "weights_in_memory", weights_in_memory, py::arg("address"), py::arg("vertices"),
+        R"(The vertex groups of a mesh, read from the memory of the Blender that this runs in: int32 [vertices], how
 many entries each vertex has; int32 [entries], the group of each, in the order of the vertices and as stored; float32
 [entries], its weight. ValueError where this can be no such memory.
 

@@ -33,7 +33,7 @@ namespace HWY_NAMESPACE {
 /// add_scale       adds the effect of a bone's scale to a sum, with the weight and with the weight that has the sign
 ///                 of the row
 template <class Rows>
-concept BlendedRows = Rows::kNumbers % 4 == 0 && Rows::kNumbers <= kMaxRow && Rows::kSignedFloat4s <= 2 &&
+concept BlendedRows = Rows::kNumbers % 4 == 0 && Rows::kNumbers <= kMaxRow&& Rows::kSignedFloat4s <= 2 &&
                       requires(Full d, const Palette& palette, Vec<Full> w, Points<Full> p,
                                Sum<Full, Rows::kNumbers> sum) {
     Rows::add_scale(d, palette, std::int32_t{0}, w, w, p, sum);
