@@ -12,8 +12,16 @@
 
 namespace sinew {
 
-/// The arguments of one call of a stage's kernels, to which each stage adds its own. It has neither palette nor
-/// parameters.
+/// Maps a point (x, y, z, 1) to its position along a bone: 0 at the head, 1 at the tail; everywhere 0 for one of
+/// length 0.
+[[nodiscard]] inline Float4 position_along(const Vec3<double>& head, const Vec3<double>& tail) noexcept {
+    const Vec3<double> along = tail - head;
+    const double squared = glm::dot(along, along);
+    const Vec3<double> position = along * (squared > 0.0 ? 1.0 / squared : 0.0);
+    return float4(position.x, position.y, position.z, -glm::dot(position, head));
+}
+
+/// The arguments of one call that the kernels of all these stages have; palette and parameters are null.
 struct StageFrame : Frame {
     const Lanes<float>* weights;  // [blocks] of the vertex group; null if all are 1
 };

@@ -261,10 +261,8 @@ bool is_orthonormal(const Mat3<double>& m) {
 BulgeBone bulge_bone(const BoneSegment<double>& segment, double stretch) noexcept {
     const Vec3<double>& head = segment.head;
     const Vec3<double> along = segment.tail - head;
-    const double squared = glm::dot(along, along);
-    const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
     return {float4(head.x, head.y, head.z, stretch), float4(along.x, along.y, along.z, 0.0),
-            float4(share.x, share.y, share.z, -glm::dot(head, share))};
+            position_along(head, segment.tail)};
 }
 
 }  // namespace

@@ -406,14 +406,11 @@ struct TwistSpread::State : BoneStage::State {
         twisted.resize(twists.size());
         list_blocks(data.parents);
         for (const TwistBone& twist : twists) {
-            const Vec3<double> along = Vec3<double>(twist.tail) - Vec3<double>(twist.head);
-            const double squared = glm::dot(along, along);
-            const Vec3<double> share = along * (squared > 0.0 ? 1.0 / squared : 0.0);
-            const Float4 row = float4(share.x, share.y, share.z, -glm::dot(share, Vec3<double>(twist.head)));
             axes.push_back(axis_at_rest(twist, rest_bones));
             TwistRest& at_rest = rest.emplace_back();
             at_rest.line = twist_line(axes.back().head, axes.back().direction);
-            std::ranges::copy(row.value, at_rest.share);
+            std::ranges::copy(position_along(Vec3<double>(twist.head), Vec3<double>(twist.tail)).value,
+                              at_rest.share);
         }
         measure();
     }
