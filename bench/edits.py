@@ -7,21 +7,18 @@ Until Blender and Sinew have evaluated it. Least times in milliseconds, without 
 from __future__ import annotations
 
 import sys
-import time
-from collections.abc import Callable
 
 import bpy
 import common
 import frames
+from instant import Step, least
 from sinew_addon.attach import attach
 from sinew_addon.deform import session
 
-ROUNDS = 12
 
-
-def edits(obj: bpy.types.Object) -> dict[str, Callable[[int], None]]:
+def edits(obj: bpy.types.Object) -> dict[str, Step]:
     """Edits of one object that need no Sinew: by name, functions of a running number."""
-    armature, view_layer = obj.modifiers["Armature"].object, bpy.context.view_layer
+    armature = obj.modifiers["Armature"].object
 
     def add_empty(_count: int) -> None:
         bpy.context.scene.collection.objects.link(bpy.data.objects.new("Empty", None))
@@ -29,7 +26,7 @@ def edits(obj: bpy.types.Object) -> dict[str, Callable[[int], None]]:
     def pose(count: int) -> None:
         armature.pose.bones[0].rotation_quaternion = (1.0, 0.01 * count, 0.0, 0.0)
 
-    changes = {
+    return {
         "pose its armature": pose,
         "move it": lambda count: setattr(obj, "location", (count, 0.0, 0.0)),
         "hide or show it": lambda count: obj.hide_set(count % 2 == 0),
@@ -37,19 +34,6 @@ def edits(obj: bpy.types.Object) -> dict[str, Callable[[int], None]]:
         "add a modifier": lambda _count: obj.modifiers.new("Smooth", "SMOOTH"),
         "add an empty": add_empty,
     }
-    return {
-        name: lambda count, change=change: (change(count), view_layer.update())
-        for name, change in changes.items()
-    }
-
-
-def least(edit: Callable[[int], None]) -> float:
-    times = []
-    for count in range(ROUNDS):
-        start = time.perf_counter()
-        edit(count)
-        times.append(time.perf_counter() - start)
-    return 1000.0 * min(times)
 
 
 def main() -> None:
