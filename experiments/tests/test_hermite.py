@@ -1,5 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects the report's cubic Hermite spline, compared with 50 digits as tests/python/test_exact.py does."""
+"""Protects the report's cubic Hermite spline, compared with 50 digits as tests/python/library/test_exact.py
+does."""
 
 import functools
 import itertools
