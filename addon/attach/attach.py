@@ -351,15 +351,14 @@ def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
 
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
-    settings, nodes, pairs = properties.of(obj), sinew_modifier(obj), replaced_modifiers(obj)
-    for name in VIEWS:
+    settings, now = properties.of(obj), layout.read(obj)
+    for view, name in enumerate(VIEWS):
         property_groups.store(settings.stack, f"show_{name}", True)
-        if settings.replaces_modifiers and nodes is not None and not is_animated(obj, nodes, f"show_{name}"):
-            _set_icon(nodes, f"show_{name}", True)
-    for name, icons in zip(VIEWS, layout.read(obj).icons, strict=True):
-        if icons.deformer is Deformer.NOTHING:
-            for modifier, _replaced in pairs:
-                _set_icon(modifier, f"show_{name}", True)
+        if settings.replaces_modifiers and now.sinew and not now.by_name[now.sinew].keyed[view]:
+            _set_icon(obj.modifiers[now.sinew], f"show_{name}", True)
+        if now.icons[view].deformer is Deformer.NOTHING:
+            for skin in now.skins:
+                _set_icon(obj.modifiers[skin.name], f"show_{name}", True)
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:

@@ -174,7 +174,7 @@ class Layout:
             known.name == now.name
             and known.shown == (now.show_viewport, now.show_render)
             and (known.kind != "NODES" or known.edited == now.show_in_editmode)
-            and (known.kind != "SUBSURF" or known.levels == _levels(now, known.levels))
+            and (known.kind != "SUBSURF" or _are_levels(known, now))
             for known, now in zip(self.modifiers, obj.modifiers, strict=True)
         )
 
@@ -206,12 +206,13 @@ def _modifier(modifier: bpy.types.Modifier, paths: set[str]) -> Modifier:
     keyed = f"{start}show_viewport" in paths, f"{start}show_render" in paths
     known = (name, modifier.persistent_uid, kind, shown, keyed)
     if kind == "NODES":
-        group = modifier.node_group
-        of = None if group is None else group.get(node_group.MARK, 0)
-        return Modifier(*known, edited=modifier.show_in_editmode, group=of)
+        nodes = modifier.node_group
+        group = None if nodes is None else nodes.get(node_group.MARK, 0)
+        return Modifier(*known, edited=modifier.show_in_editmode, group=group)
     if kind == "SUBSURF":
-        are_keyed = (start + name in paths for name in ("levels", "render_levels"))
-        return Modifier(*known, levels=_levels(modifier, [None if keyed else 0 for keyed in are_keyed]))
+        viewport = None if f"{start}levels" in paths else modifier.levels
+        render = None if f"{start}render_levels" in paths else modifier.render_levels
+        return Modifier(*known, levels=(viewport, render))
     if kind == "ARMATURE":
         armature = modifier.object
         method = "" if f"{start}use_deform_preserve_volume" in paths else method_of(modifier)
@@ -223,15 +224,9 @@ def _modifier(modifier: bpy.types.Modifier, paths: set[str]) -> Modifier:
     return Modifier(*known, is_bound=kind == "LAPLACIANDEFORM" and modifier.is_bind)
 
 
-def _levels(
-    modifier: bpy.types.SubsurfModifier, known: Sequence[int | None]
-) -> tuple[int | None, int | None]:
-    """known: None for the animated ones."""
-    viewport, render = known
-    return (
-        None if viewport is None else modifier.levels,
-        None if render is None else modifier.render_levels,
-    )
+def _are_levels(known: Modifier, now: bpy.types.SubsurfModifier) -> bool:
+    viewport, render = known.levels
+    return viewport in (None, now.levels) and render in (None, now.render_levels)
 
 
 def method_of(modifier: bpy.types.ArmatureModifier) -> str:

@@ -35,12 +35,7 @@ class ModifierOptions:
         """None stands for the parent type Armature, which has no modifier in the stack."""
         if modifier is None:
             return cls(True, True, "", False, False)
-        return cls(*cls.values(modifier))
-
-    @staticmethod
-    def values(modifier: bpy.types.ArmatureModifier) -> tuple[bool, bool, str, bool, bool]:
-        """Returns the same values in the same order, for quick comparison."""
-        return tuple(getattr(modifier, name) for name in NAMES)
+        return cls(*(getattr(modifier, name) for name in NAMES))
 
     def weighting(self, group_names: list[str], weights: GroupWeights, bones: Bones) -> Weighting:
         """Returns what deforms the mesh: its groups that have a bone, or no groups where the modifier does

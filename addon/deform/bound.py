@@ -23,7 +23,6 @@ from ..skinning.rig import Bones, RigFacts, Weighting
 from ..skinning.skin_stack import ModifierSkin, SkinDeformer, SkinStack
 from ..skinning.stage_mesh import StageMesh
 from ..skinning.stages import StagesAfter
-from ..skinning.vectors import transformed
 from ..skinning.vertex_data import VertexData
 from . import source, survey
 from .plan import Normals
@@ -137,10 +136,12 @@ def read(
     for option, its_bones, space, its_old in itertools.zip_longest(options, bones, spaces_now, before):
         if option is None:
             break
-        if its_old is not None and its_bones.equals(its_old.deformer.bones):
-            its_bones = its_old.deformer.bones.without_skin
+        known = None if its_old is None else its_old.deformer.bones
+        if known is not None and known.skin is None and its_bones.equals(known):
+            # With all that was made of them.
+            its_bones = known
         weighting = option.weighting(read_now.group_names, read_now.weights, its_bones)
-        weighting = _with_skin(weighting, read_now, space)
+        weighting = weighting.with_skin(read_now.surface_points, space)
         deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
         skins.append(
             ModifierSkin(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
@@ -165,7 +166,7 @@ def _vertex_data(weighting: Weighting, read_now: Source, before: ModifierSkin | 
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound) -> Bound:
-    """Returns the same with the mesh's triangles, without reading weights again, which takes far longer.
+    """Returns the same with the mesh's triangles; nothing else is read.
 
     Requires source.is_ready(), and that the mesh is the one that was read.
     """
@@ -225,15 +226,8 @@ def _has_same_limbs(before: Weighting, read_now: Source, space: np.ndarray | Non
     known = before.bones.limbs
     if not known.by_skin.any():
         return True
-    now = _with_skin(before, read_now, space).bones.limbs
+    now = before.with_skin(read_now.surface_points, space).bones.limbs
     return are_equal(now.vectors, known.vectors) and are_equal(now.known, known.known)
-
-
-def _with_skin(weighting: Weighting, read_now: Source, space: np.ndarray | None) -> Weighting:
-    """Transforms the points only where skin tells limbs."""
-    if space is None or not weighting.bones.limbs.by_skin.any():
-        return weighting
-    return weighting.with_skin(transformed(read_now.surface_points, space))
 
 
 def _bones_from_model(

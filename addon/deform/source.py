@@ -216,8 +216,8 @@ def _group_names(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> list[
 def is_slider_moved(
     obj: bpy.types.Object, source: Source, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> bool:
-    """Whether the values of shape keys differ from those known. Setting a value touches the mesh as a change
-    of weights does, and reading weights at each step of a slider would cost more than the frame."""
+    """Whether the values of shape keys differ from those known. Setting a value touches the mesh as an edit
+    does, and reading all keys at each step of a slider would cost more than the frame."""
     keys = obj.data.shape_keys
     if keys is None or source.from_upstream or obj.data.session_uid not in changes.meshes:
         return False

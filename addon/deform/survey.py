@@ -41,8 +41,8 @@ def describe(
 def _apart(obj: bpy.types.Object) -> list[str]:
     """Returns a sentence where Armature modifiers do not directly follow the first."""
     now = layout.read(obj)
-    apart = [m.name for m in now.modifiers if m.armature is not None and m not in now.skins]
-    names = [name for name in apart if now.by_name[name].armature.uid]
+    others = (m for m in now.modifiers if m not in now.skins)
+    names = [m.name for m in others if m.armature is not None and m.armature.uid]
     text = (
         "Armature modifiers apart from the first stay Blender's: {names}; move them right behind it to have "
         "Sinew deform by them"

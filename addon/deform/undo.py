@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Keeps what is known of objects over undo and redo: reading them again takes longer than the step.
+"""Keeps what is known of objects over undo and redo: binding them again takes longer than the step.
 
 Blender keeps in memory what is the same in both steps, and lists everything else in the next evaluation. So
 an object stays known if Sinew deforms it within the evaluation, from its own mesh alone, and if it was shown

@@ -257,7 +257,7 @@ class _Event:
         skinned, obj = self.skinned, self.obj
         if skinned is None or new != self.old or not new.is_in_depsgraph:
             return False
-        is_only_due = facts.is_due and replace(facts, is_due=False).calls_for_plan is False
+        is_only_due = facts.is_due and not replace(facts, is_due=False).calls_for_plan
         return is_only_due and skinned.is_as_noted(obj, self.layout) and skinned.has_same_surroundings(obj)
 
     def _full_plan(self) -> Plan:

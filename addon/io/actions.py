@@ -262,9 +262,3 @@ def players(animation: bpy.types.AnimData) -> list[bpy.types.AnimData | bpy.type
 def is_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier, name: str) -> bool:
     """Whether keys or drivers set a modifier's property."""
     return f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].{name}' in animated_paths(obj)
-
-
-def is_visibility_animated(obj: bpy.types.Object, modifier: bpy.types.Modifier) -> bool:
-    """Whether keys or drivers switch a modifier on and off."""
-    start = f'modifiers["{bpy.utils.escape_identifier(modifier.name)}"].show_'
-    return not animated_paths(obj).isdisjoint((f"{start}viewport", f"{start}render"))

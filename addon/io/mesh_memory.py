@@ -3,7 +3,7 @@
 
 Scripts can read them only vertex by vertex, through an object for each, which takes a hundred times as long.
 And where a mesh shares them, as with its evaluated copy or an undo step, the first such look copies all of
-them (seen on 4.5 and 5.3).
+them (seen on 4.2 to 5.3).
 """
 
 import ctypes
@@ -38,7 +38,7 @@ OFFSETS = {
 }
 # In CustomData, after the pointer to its layers; the same in all these versions.
 LAYER_COUNT = 220
-# The kind of a layer of vertex groups, at the begin of CustomDataLayer (eCustomDataType).
+# The kind of a layer of vertex groups, at the start of CustomDataLayer (eCustomDataType).
 CD_MDEFORMVERT = 2
 
 

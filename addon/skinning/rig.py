@@ -17,6 +17,7 @@ from .envelopes import Envelopes, fill_from_envelopes, multiply_by_envelopes
 from .influences import Entries, Influences
 from .limbs import Limbs, find_limbs, skin_of
 from .twists import TwistFinder, Twists
+from .vectors import SAME_SPACE, transformed
 
 NAMES_SHOWN = 5
 
@@ -112,11 +113,6 @@ class Bones(OfArrays):
         """float64 [bones, 3]: `limbs` in each bone's own axes: along Y unless it stands across."""
         own = np.linalg.pinv(self.rest[: len(self.names), :3, :3].astype(np.float64))
         return (own @ self.limbs.vectors[..., None])[..., 0]
-
-    @property
-    def without_skin(self) -> Bones:
-        """The same, with all that was made of them where no skin tells a limb."""
-        return self if self.skin is None else replace(self, skin=None)
 
     def with_skin_of(self, other: Bones) -> Bones:
         """Returns the same, whose skin is also that of the same bones for another mesh."""
@@ -240,14 +236,16 @@ class Weighting:
             entries = fill_from_envelopes(entries, envelopes, self.bones.deform, points)
         return entries.influences()
 
-    def with_skin(self, points: np.ndarray | None) -> Weighting:
+    def with_skin(self, points: np.ndarray, space: np.ndarray | None) -> Weighting:
         """Returns the same, whose bones know the skin that they move, where it may tell their limbs.
 
-        points  float [vertices, 3] at rest, armature space; None where it has no size
+        points  float [vertices, 3] at rest
+        space   [4, 4], from theirs to armature space; None where that has no size
         """
         by_skin = self.bones.limbs.by_skin
-        if points is None or not by_skin.any():
+        if space is None or not by_skin.any():
             return self
+        points = points if space is SAME_SPACE else transformed(points, space)
         skin = skin_of(self.influences(points), points, by_skin)
         return replace(self, bones=replace(self.bones, skin=skin))
 

@@ -24,7 +24,7 @@ from ...skinning.influences import GroupWeights, Influences, entries_of_bones
 from ...skinning.influences import joined as influences_of_all
 from ...skinning.rig import Bones, Weighting
 from ...skinning.surface import joined
-from ...skinning.vectors import transformed
+from ...skinning.vectors import SAME_SPACE, transformed
 from .diagnostics import Finding, PoseCheck, check_weights
 from .metrics import FrameOfRig, Gauge, Summary
 
@@ -48,7 +48,7 @@ class Edited:
         bones = armature_io.read_bones(armature.evaluated_get(depsgraph))
         weights = mesh_io.read_group_weights(obj.data)
         points = _in_armature_space(obj, armature, obj.data, depsgraph)
-        weighting = _weighting(obj, obj, weights, bones).with_skin(points)
+        weighting = _weighting(obj, obj, weights, bones).with_skin(points, SAME_SPACE)
         return cls(obj, weighting, weights, points, PoseCheck(weighting.influences_over_joints(points)))
 
     def findings(self, most_influences: int) -> list[Finding]:
