@@ -16,6 +16,7 @@ from ..features.measure.diagnostics import USUAL_INFLUENCES
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
+from ..skinning.variants import SYNTAX
 from .arguments import (
     add_engine,
     add_files,
@@ -26,6 +27,7 @@ from .arguments import (
     check_viewer,
     count_or_none,
     pixels,
+    variants,
 )
 from .console import Console
 
@@ -48,6 +50,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--methods",
         help="of `sinew methods`, recommended, and blender for the Armature modifier (default: "
         f"{','.join(USUAL_METHODS)})",
+    )
+    parser.add_argument(
+        "--variants",
+        type=variants,
+        metavar="VARIANTS",
+        help=f"in the place of --methods, divided by commas: {SYNTAX}",
     )
     parser.add_argument(
         "--reference",
@@ -91,6 +99,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     named = USUAL_METHODS if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference], PRESETS)
+    _check_variants(args)
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:
         raise WrongUse("expected --out, --viewer or both")
@@ -112,6 +121,18 @@ def run(args: argparse.Namespace, console: Console) -> int:
             complete = False
         failed |= not complete
     return 1 if failed else 0
+
+
+def _check_variants(args: argparse.Namespace) -> None:
+    if args.variants is None:
+        return
+    others = {
+        "--methods": args.methods is not None,
+        "--set": bool(args.set),
+        "--viewer": args.viewer is not None,
+    }
+    for option in (option for option, is_given in others.items() if is_given):
+        raise WrongUse(f"--variants names whole choices, which {option} does not take; leave one away")
 
 
 def _check_names(files: list[Path]) -> None:
@@ -174,15 +195,18 @@ def _compare(
     scene = bpy.context.scene
     frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
     characters.set_frame(scene, frames[0])
-    played = [*methods, args.reference]
-    meshes, left_out = characters.deformable_meshes(scene, path, played, args.object)
+    found = characters.deformed_meshes_of(scene, path, args.object)
+    own = {each.key: characters.own_variants(found, each) for each in args.variants or ()}
+    methods = list(own) or methods
+    named = {each.method for of_meshes in own.values() for each in of_meshes.values()} or methods
+    meshes, left_out = characters.taken(found, path, [*named, args.reference])
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = subjects.gather(scene, meshes)
     folder, sheets = args.out / as_file_name(path.stem), []
-    with characters.kept_presets(meshes, played):
+    with characters.kept_choices(meshes, [*named, args.reference], own):
         console.note_on(path, characters.sentences())
-        comparison = _measure(path, subject, methods, frames, args, console)
+        comparison = _measure(path, subject, _labels(methods, args), frames, args, console)
         write_text(folder / "metrics.json", comparison.to_json())
         if engine is not None:
             studio = render.Studio(scene, subject.meshes, engine, args.size)
@@ -198,18 +222,27 @@ def _compare(
     return not left_out
 
 
+def _labels(methods: list[str], args: argparse.Namespace) -> dict[str, str]:
+    """By the names of methods, or by the keys of variants."""
+    from ..attach import properties
+
+    if args.variants is None:
+        return {name: properties.method_label(name) for name in methods}
+    return {each.key: each.title for each in args.variants}
+
+
 def _measure(
     path: Path,
     subject: Subject,
-    methods: list[str],
+    labels: dict[str, str],
     frames: list[float],
     args: argparse.Namespace,
     console: Console,
 ) -> Comparison:
-    from ..attach import properties
     from ..deform import characters
     from ..features.measure import subjects
 
+    methods = list(labels)
     batches = subjects.batches(subject, frames, len(methods) + 1)
     measured = subjects.Measurements.of(methods)
     rest: RestFacts | None = None
@@ -220,7 +253,7 @@ def _measure(
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],
-        {name: name.title() if name in PRESETS else properties.method_label(name) for name in methods},
+        labels,
         args.reference,
         characters.length_unit(subject.scene),
         rest,

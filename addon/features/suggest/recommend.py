@@ -9,14 +9,14 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, property_groups, stage_settings
+from ...attach import attach, properties
 from ...base.errors import SinewError
 from ...base.phrases import phrase
 from ...base.steps import as_part, result_of
 from ...deform import characters
 from ...io import armature_io
-from ...skinning.parameters import OFF, Value
 from ...skinning.rig import Bones
+from ...skinning.variants import Variant
 from ...ui import stepped
 from ..measure import battery, live
 from ..measure.crossings import crossing_triangles
@@ -74,14 +74,14 @@ def search(
         named = _in_battery(live.Moment.of(now))
     moments = [_with_crossings(name, moment, k, len(named)) for k, (name, moment) in enumerate(named)]
     if not moments:
-        return Choice("lbs")
+        return Choice(Variant.of("lbs"))
     subject = moments[0].moment.subject
     skin = moments[0].moment.pose.skin
     crude = recommendation.is_crude(skin.influences, subject.gauge.surface.edges)
 
-    def measure(choice: Choice, number: int) -> recommendation.Values:
+    def measure(variant: Variant, number: int) -> recommendation.Values:
         _name, moment, at_rest = moments[number]
-        measured = moment.measured(choice.method, choice.stage_values)
+        measured = moment.measured(variant.method, variant.stage_values)
         crossing = None
         if at_rest is not None and np.isfinite(measured.shape.points).all():
             crossing = _new_crossings(moment, measured.shape.points.T, at_rest)
@@ -178,15 +178,4 @@ def _angles(moment: live.Moment) -> np.ndarray:
 def choose(objects: Sequence[bpy.types.Object]) -> characters.Chosen:
     """See characters.choosers."""
     choice = result_of(search(bpy.context.scene, objects))
-    return choice.method, choice.values, choice.text
-
-
-def use(objects: Sequence[bpy.types.Object], choice: Choice) -> None:
-    """Sets it on objects that have Sinew. The caller has them deformed."""
-    for obj in objects:
-        settings = properties.of(obj)
-        property_groups.assign(settings, "method", choice.method)
-        for name, value in choice.values.items():
-            group, _dot, own = name.partition(".")
-            stored: Value = stage_settings.OFF if value == OFF else value
-            property_groups.assign(getattr(settings, group), own, stored)
+    return choice.variant.method, choice.variant.all_values, choice.text

@@ -56,10 +56,13 @@ def test_one_combination_is_recommended_and_a_click_uses_it():
     bpy.ops.sinew.suggest()
     suggestion, choice = found(), recommend.choices[bpy.context.scene.session_uid]
     assert choice == recommend.result_of(recommend.search(bpy.context.scene, [obj]))
-    assert choice.stages == ("twist_spread",)
+    assert choice.variant.stages == ("twist_spread",)
     assert suggest.RECOMMENDED in suggestion.methods
     bpy.ops.sinew.use_recommended()
-    assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (choice.method, True)
+    assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (
+        choice.variant.method,
+        True,
+    )
     bpy.context.scene.frame_set(11)
     measured = scenes.measure(obj).measured
     known = suggestion.worst[suggest.RECOMMENDED, "volume"]
