@@ -16,7 +16,8 @@ from ..features.measure.diagnostics import USUAL_INFLUENCES
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
-from ..skinning.variants import SYNTAX
+from ..skinning.variants import SYNTAX, parse_list
+from . import contact_sheet
 from .arguments import (
     add_engine,
     add_files,
@@ -26,6 +27,7 @@ from .arguments import (
     add_viewer,
     check_viewer,
     count_or_none,
+    file_named,
     pixels,
     variants,
 )
@@ -35,6 +37,7 @@ if TYPE_CHECKING:
     from ..features.measure.subjects import Subject
 
 
+SHEET = "blender, dq, cor, dq+twist_spread+bulge_limit, dq+twist_spread+delta_mush, recommended"
 SUMMARY = "show and measure methods beside each other"
 HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
@@ -80,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how many bones a vertex may have before it is reported (default: %(default)s)",
     )
     parser.add_argument(
-        "--size", type=pixels, default=480, help="pixels of each picture (default: %(default)s)"
+        "--size", type=pixels, help="pixels of each picture (default: 480; 240 of a contact sheet)"
     )
     add_engine(parser)
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="folder for the pages")
@@ -89,6 +92,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "write a page in which the character of the file moves and turns in the browser; without --out it "
         "alone",
     )
+    parser.add_argument(
+        "--sheet",
+        type=file_named(".png"),
+        metavar="SHEET.png",
+        help="write a contact sheet: the joints of the character bent in stated poses, a row for each "
+        f"variant (default: {SHEET})",
+    )
     add_set(parser)
 
 
@@ -96,13 +106,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..deform import characters
     from ..features.pages import render
 
+    if args.sheet is not None:
+        return _run_sheet(args, console)
     named = USUAL_METHODS if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference], PRESETS)
     _check_variants(args)
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:
-        raise WrongUse("expected --out, --viewer or both")
+        raise WrongUse("expected --out, --viewer or both; or --sheet")
     check_viewer(args.viewer, len(args.files))
     if args.out is not None:
         require_jinja()
@@ -121,6 +133,48 @@ def run(args: argparse.Namespace, console: Console) -> int:
             complete = False
         failed |= not complete
     return 1 if failed else 0
+
+
+def _run_sheet(args: argparse.Namespace, console: Console) -> int:
+    given = {"--out": args.out, "--viewer": args.viewer, "--methods": args.methods, "--frames": args.frames}
+    for option in (option for option, value in given.items() if value is not None):
+        raise WrongUse(f"--sheet: {option} does not go with it; --variants names its rows")
+    if len(args.files) > 1:
+        raise WrongUse(f"{args.sheet}: --sheet writes the sheet of a single file")
+    _check_variants(args)
+    contact_sheet.require_pillow()
+    try:
+        return 0 if _write_sheet(args.files[0], args, console) else 1
+    except SinewError as error:
+        console.complain(error)
+        return 1
+
+
+def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool:
+    """Returns False where a mesh was left out."""
+    import bpy
+
+    from ..deform import characters
+    from ..features.pages import contact_sheet as drawn
+    from ..io import files
+
+    console.note_on(path, files.open_file(path))
+    variants = args.variants or parse_list(SHEET)
+    found = characters.deformed_meshes_of(bpy.context.scene, path, args.object)
+    own = {each: characters.own_variants(found, each) for each in variants}
+    meshes, left_out = characters.taken(found, path, ["dq"])
+    for reason in left_out:
+        console.complain(f"{path}: left out: {reason}")
+    rows = [characters.with_presets(own[each]) for each in variants]
+    console.note_on(path, characters.sentences())
+    joints = drawn.columns(meshes)
+    count = len(rows) * len(joints)
+    steps = drawn.cells(joints, rows, args.size or 240)
+    cells = list(console.progress(steps, count, f"Drawing {path.name}"))
+    columns = [(joint.joint, joint.pose.name) for joint in joints]
+    contact_sheet.write(args.sheet, path.stem, [each.title for each in variants], columns, cells)
+    console.say(str(args.sheet))
+    return not left_out
 
 
 def _check_variants(args: argparse.Namespace) -> None:
@@ -209,7 +263,7 @@ def _compare(
         comparison = _measure(path, subject, _labels(methods, args), frames, args, console)
         write_text(folder / "metrics.json", comparison.to_json())
         if engine is not None:
-            studio = render.Studio(scene, subject.meshes, engine, args.size)
+            studio = render.Studio(scene, subject.meshes, engine, args.size or 480)
             illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
             illustrator.plan(args.pictures)
             count = illustrator.picture_count

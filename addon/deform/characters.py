@@ -185,6 +185,17 @@ def own_variants(meshes: Sequence[bpy.types.Object], variant: Variant) -> dict[b
     return {obj: variant_settings.read(obj) if variant.method == FILE else variant for obj in meshes}
 
 
+def with_presets(variants: Mapping[bpy.types.Object, Variant]) -> dict[bpy.types.Object, Variant]:
+    """Returns the same with what each preset chooses. Raises SinewError where it can not choose."""
+    wanted = [(obj, variant.method) for obj, variant in variants.items() if variant.method in choosers]
+    if not wanted:
+        return dict(variants)
+    found, values, failed = _with_presets(wanted, {})
+    for error in failed.values():
+        raise error
+    return variants | {obj: Variant.of_values(method, values[obj]) for obj, method in found}
+
+
 # The method of meshes while a preset is being chosen.
 _FIRST = "dq"
 _sentences: list[str] = []

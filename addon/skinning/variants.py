@@ -80,6 +80,12 @@ class Variant:
                 kept[full_name] = value
         return cls(method, tuple(order), tuple(sorted(kept.items())), name)
 
+    @classmethod
+    def of_values(cls, method: str, values: Mapping[str, Value]) -> Variant:
+        """Of all values of stages, which say what is on."""
+        on = [name for name in _STAGES if values.get(_switch_of(name), False) not in (False, OFF)]
+        return cls.of(method, on, values)
+
     @property
     def text(self) -> str:
         """What parse() reads, without the name."""

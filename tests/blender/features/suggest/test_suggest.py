@@ -14,7 +14,7 @@ from sinew_addon.features.flex import feature as flex_feature
 from sinew_addon.features.measure import worst_frames
 from sinew_addon.features.measure.crossings import crossing_triangles
 from sinew_addon.features.measure.suggestion import CRITERIA, MEASURED, Suggestion
-from sinew_addon.features.suggest import recommend, suggest, thumbnail, worst_pictures
+from sinew_addon.features.suggest import recommend, suggest, worst_pictures
 from sinew_addon.io import actions
 from sinew_addon.ui import stepped
 
@@ -107,9 +107,9 @@ def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
     monkeypatch.setattr(worst_pictures, "are_drawn", lambda: True)
     seen = []
     monkeypatch.setattr(
-        worst_pictures.thumbnail,
+        worst_pictures.shaded,
         "draw",
-        lambda *args, own=thumbnail.draw: seen.append(own(*args)) or seen[-1],
+        lambda *args, own=worst_pictures.shaded.draw: seen.append(own(*args)) or seen[-1],
     )
     list(suggest.scan(scene, [obj], "SCENE"))
     assert len(seen) == len(found().methods)
