@@ -22,9 +22,9 @@ from sinew_addon.deform import handlers, precompute_watch, safe_mode, session, s
 from sinew_addon.features.bake import bake
 from sinew_addon.features.bake.helper_bones import HelperOptions
 from sinew_addon.features.compare import comparison, comparison_state
-from sinew_addon.features.motion_range import clip
 from sinew_addon.features.corrective import corrective_key
 from sinew_addon.features.diagnose import diagnose, mending
+from sinew_addon.features.motion_range import clip
 from sinew_addon.skinning.precompute import precomputations
 from sinew_addon.ui import presets
 from walk_sides import (
