@@ -310,6 +310,7 @@ class SinewSettings(bpy.types.PropertyGroup):
         "mesh is small, takes less time",
         default=True,
     )
+    variants: _hidden(bpy.props.StringProperty, "The variants of the character, a line each")
     replaced_modifiers: bpy.props.CollectionProperty(
         type=SinewReplacedModifier, options={"HIDDEN"}, override=_INSERTABLE
     )
@@ -446,7 +447,7 @@ SHARED = ("method", "scale_rule", "normals", "leave_small")
 def share(source: bpy.types.Object, target: bpy.types.Object) -> None:
     """Copies the shared settings of a mesh to another. The caller suspends updates meanwhile."""
     own, other = of(target), of(source)
-    for name in SHARED:
+    for name in (*SHARED, "variants"):
         property_groups.assign(own, name, getattr(other, name))
     for group, cls in SETTING_GROUPS.items():
         for name in cls.__annotations__:

@@ -143,6 +143,13 @@ class Variant:
         """The second method of the mix; empty without one."""
         return str(dict(self.values).get("mix.method", ""))
 
+    def agrees_with(self, other: Variant) -> bool:
+        """Whether another has all that this one sets."""
+        own, others = dict(self.values), dict(other.values)
+        settings = {name: others[name] for name in own if name in SETTINGS and name in others}
+        others = {name: value for name, value in others.items() if name not in SETTINGS} | settings
+        return (self.method, self.stages, own) == (other.method, other.stages, others)
+
     @property
     def label(self) -> Phrase:
         """Method and stages, as "Centres of Rotation with Twist Spread and Limit Bulge"."""

@@ -132,6 +132,7 @@ class SINEW_MT_stages(_Submenu, bpy.types.Menu):
         Entry("sinew.make_group", "Make Vertex Group of the Mix", values={"stage": "mix"}),
         Entry("sinew.make_group", "Make Vertex Group of Limit Bulge", values={"stage": "bulge_limit"}),
         Entry("sinew.make_group", "Make Vertex Group of Delta Mush", values={"stage": "delta_mush"}),
+        Entry("sinew.add_variant"),
         Entry("sinew.method_preset_add", "Save Method as Preset\u2026"),
     )
 

@@ -21,6 +21,7 @@ from ...attach import (
     property_groups,
     stack,
     upstream_proxy,
+    variant_settings,
 )
 from ...attach.updates import updates_suspended
 from ...base.errors import SinewError
@@ -28,7 +29,9 @@ from ...deform import characters, session
 from ...io import actions
 from ...io.actions import players
 from ...skinning.stages import ORDER
+from ...skinning.variants import parse
 from ...skinning.vectors import transformed
+from ...ui.translations import tr
 from . import comparison_state, offset_nodes
 
 # The space between two characters, as a share of a character's width.
@@ -56,9 +59,9 @@ ACTION_MARK = "sinew_comparison"
 def start(
     context: bpy.types.Context, meshes: Sequence[bpy.types.Object], methods: Sequence[str], right: np.ndarray
 ) -> list[str]:
-    """Compares the visible parts of a character under `methods` of characters.method_names(), in the
-    context's scene and in place of the current comparison. Returns a sentence for each mesh that cannot be
-    compared, and for each method that fails on one.
+    """Compares the visible parts of a character under `methods`, each of characters.method_names() or the key
+    of a variant, in the context's scene and in place of the current comparison. Returns a sentence for each
+    mesh that cannot be compared, and for each method that fails on one.
 
     right  [3], the direction of the screen's right in the world; the copies are placed along the nearest axis
 
@@ -81,8 +84,8 @@ def start(
     try:
         with updates_suspended():
             for obj in taken:
-                for method in methods:
-                    collection.objects.link(_copy(obj, method))
+                for number, method in enumerate(methods):
+                    collection.objects.link(_copy(obj, method, _colour(method, number)))
             state.axis = axis
             state.spacing = _spacing(points, axis)
             state.first, state.second = methods[0], _other_than(methods[0], methods)
@@ -121,6 +124,13 @@ def _comparable(meshes: Sequence[bpy.types.Object]) -> tuple[list[bpy.types.Obje
 def is_on() -> bool:
     """Whether any scene of the file itself shows a comparison."""
     return bool(_states())
+
+
+def label_shown(obj: bpy.types.Object) -> str:
+    """Returns that of the shape that an object shows, with its stages."""
+    if method_shown(obj) == characters.BLENDER:
+        return tr(properties.method_label(characters.BLENDER))
+    return tr(variant_settings.read(obj).label)
 
 
 def method_shown(obj: bpy.types.Object) -> str:
@@ -216,9 +226,16 @@ def corners(evaluated: bpy.types.Object) -> np.ndarray:
     return transformed(np.array([tuple(corner) for corner in evaluated.bound_box]), matrix)
 
 
-def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
+def _colour(method: str, number: int) -> tuple[float, float, float]:
+    names = characters.method_names()
+    return COLOURS[(names.index(method) if method in names else number) % len(COLOURS)]
+
+
+def _copy(obj: bpy.types.Object, method: str, colour: tuple[float, float, float]) -> bpy.types.Object:
     """Returns a copy, deformed by `method` if an armature deforms it, in no collection yet."""
-    copy = upstream_proxy.copy_that_follows(obj, f"{obj.name} {properties.method_label(method)}")
+    variant = parse(method) if comparison_state.is_variant(method) else None
+    label = variant.title if variant is not None else properties.method_label(method)
+    copy = upstream_proxy.copy_that_follows(obj, f"{obj.name} {label}")
     original = properties.of(obj) if properties.has_sinew(obj) else None
     replaced = corrective_smooth.replaced_modifier(obj) if original is not None else None
     smooth = replaced.name if replaced is not None else None
@@ -228,11 +245,11 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
     if copy.field is not None:
         copy.field.type = "NONE"
     copy.hide_select = True
-    copy.color = (*COLOURS[characters.method_names().index(method) % len(COLOURS)], 1.0)
+    copy.color = (*colour, 1.0)
     settings = properties.of(copy)
     settings.identity.copied, settings.identity.method = obj, method
     if method != characters.BLENDER and attach.armature_of(copy) is not None:
-        attach.add(copy, method)
+        attach.add(copy, variant.method if variant is not None else method)
         if original is not None:
             settings.scale_rule = original.scale_rule
             # A copy shows one method, without another mixed in.
@@ -240,6 +257,8 @@ def _copy(obj: bpy.types.Object, method: str) -> bpy.types.Object:
             if smooth is not None:
                 # The stage replaces it.
                 copy.modifiers.remove(copy.modifiers[smooth])
+        if variant is not None:
+            variant_settings.use([copy], variant)
     offset_nodes.add(copy)
     return copy
 

@@ -35,13 +35,12 @@ def labels(context: bpy.types.Context) -> list[tuple[str, tuple[float, float, fl
     found = []
     originals = comparison.originals(state)
     if originals:
-        method = comparison.method_shown(originals[0])
-        text = tr("Original: {method}", method=tr(properties.method_label(method)))
+        text = tr("Original: {method}", method=comparison.label_shown(originals[0]))
         found.append((text, (1.0, 1.0, 1.0), originals))
     for method in comparison_state.shown_methods(state):
         copies = groups.get(method, [])
         if copies:
-            found.append((tr(properties.method_label(method)), tuple(copies[0].color[:3]), copies))
+            found.append((comparison_state.label_of(method), tuple(copies[0].color[:3]), copies))
     depsgraph = context.evaluated_depsgraph_get()
     placed = [(text, colour, _top(objects, context, depsgraph)) for text, colour, objects in found]
     return [label for label in placed if label[2] is not None]

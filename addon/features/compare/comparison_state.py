@@ -7,7 +7,13 @@ import bpy
 
 from ...attach import properties
 from ...deform import characters
+from ...skinning.variants import parse
+from ...ui.translations import tr
 from . import offset_nodes
+
+# Numbers of variants in lists of choices.
+FIRST_VARIANT = 10_000
+_items: dict[tuple[str, int], tuple] = {}
 
 SIDE_BY_SIDE, OVERLAID, ONE_OF_TWO = "SIDE", "OVERLAY", "FLIP"
 
@@ -17,8 +23,14 @@ def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
 
 
 def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
-    choices = {item[0]: item for item in properties.method_choices()}
-    return [choices[name] for name in methods_of(state)]
+    choices: dict[str, tuple] = {item[0]: item for item in properties.method_choices()}
+    keys = methods_of(state)
+    variants = [key for key in keys if is_variant(key)]
+    # Blender does not keep the texts of computed items.
+    for number, key in enumerate(variants, start=FIRST_VARIANT):
+        _items[key, number] = (key, *(2 * (label_of(key),)), "NONE", number)
+        choices[key] = _items[key, number]
+    return [choices[key] for key in keys]
 
 
 class SinewComparison(bpy.types.PropertyGroup):
@@ -84,9 +96,19 @@ def copies_of(state: SinewComparison) -> list[bpy.types.Object]:
 
 
 def methods_of(state: SinewComparison) -> list[str]:
-    """Returns the methods that have copies, in the table's order."""
-    there = {properties.of(obj).identity.method for obj in copies_of(state)}
-    return [name for name in characters.method_names() if name in there]
+    """Returns the methods that have copies, in the table's order; then keys of variants, in theirs."""
+    there = dict.fromkeys(properties.of(obj).identity.method for obj in copies_of(state))
+    return [name for name in characters.method_names() if name in there] + list(filter(is_variant, there))
+
+
+def is_variant(name: str) -> bool:
+    """Whether it is the key of a variant, and no method's name."""
+    return "=" in name
+
+
+def label_of(name: str) -> str:
+    """name: of a method, or the key of a variant"""
+    return tr(parse(name).title) if is_variant(name) else tr(properties.method_label(name))
 
 
 def arrange(state: SinewComparison) -> None:

@@ -13,11 +13,12 @@ from ...attach.subscribers import subscribers
 from ...attach.updates import may_change_file, updates_suspended
 from ...base.errors import SinewError
 from ...deform import characters
+from ...skinning.variants import parse_list
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, draw_text
-from ...ui.translations import tr
 from ..pages import viewer
 from ..pages.save import SavesPage
+from ..variants import stored
 from . import comparison, comparison_labels, comparison_state, framing
 
 
@@ -77,6 +78,10 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
         options={"ENUM_FLAG"},
         default={"lbs", "dq", "cor"},
     )
+    variants: bpy.props.StringProperty(
+        name="Variants",
+        description="Also a copy under each of these, divided by commas, as `sinew methods` explains",
+    )
     # Clicking an enum flag would clear all others.
     choices: bpy.props.CollectionProperty(
         type=SinewComparisonChoice,
@@ -94,29 +99,37 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         state = comparison_state.of_scene(context.scene)
-        if state is not None and comparison_state.methods_of(state):
-            self.methods = set(comparison_state.methods_of(state))
+        compared = comparison_state.methods_of(state) if state is not None else []
+        if compared:
+            self.methods = {name for name in compared if not comparison_state.is_variant(name)}
         else:
             shown = {comparison.method_shown(obj) for obj in attach.deformed_meshes(character(context))}
             if len(shown) == 1:
                 # Its copy would be the original once more.
                 self.methods -= shown
         self.choices.clear()
-        for name, _label, _description in METHOD_ITEMS:
+        variants = [each.key for each in stored.of_methods(context)]
+        for name in (*(item[0] for item in METHOD_ITEMS), *dict.fromkeys(variants)):
             choice = self.choices.add()
-            choice.name, choice.is_shown = name, name in self.methods
+            choice.name, choice.is_shown = name, name in self.methods or name in compared
         return context.window_manager.invoke_props_dialog(self)
 
     def draw(self, _context: bpy.types.Context) -> None:
         column = self.layout.column(align=True)
         column.label(text="Show a copy under each of these")
         for choice in self.choices:
-            column.prop(choice, "is_shown", text=properties.method_label(choice.name))
+            column.prop(choice, "is_shown", text=comparison_state.label_of(choice.name), translate=False)
 
     def run(self, context: bpy.types.Context) -> None:
         if self.choices:
-            self.methods = {choice.name for choice in self.choices if choice.is_shown}
+            chosen = [choice.name for choice in self.choices if choice.is_shown]
+            self.methods = {name for name in chosen if not comparison_state.is_variant(name)}
+            self.variants = ",".join(filter(comparison_state.is_variant, chosen))
         methods = [name for name in characters.method_names() if name in self.methods]
+        for variant in parse_list(self.variants) if self.variants.strip() else ():
+            if variant.method not in properties.METHODS:
+                raise SinewError(f"{variant.method} can not be shown as a variant beside the character")
+            methods.append(variant.key)
         meshes = character(context) or _compared(context)
         if not methods:
             raise SinewError("Choose at least one method to compare")
@@ -161,7 +174,7 @@ class SINEW_OT_flip_comparison(operators.Named, bpy.types.Operator):
         else:
             state.shows_second = not state.shows_second
         (shown,) = comparison_state.shown_methods(state)
-        self.report({"INFO"}, properties.method_label(shown))
+        self.report({"INFO"}, comparison_state.label_of(shown))
 
 
 class SINEW_OT_end_comparison(operators.Acting, bpy.types.Operator):
@@ -209,7 +222,10 @@ class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
         attached = [obj for obj in meshes if obj not in of_each]
         armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in of_each))
         frames = stepped.frames_over(scene, armatures, self.over)
-        methods = comparison_state.methods_of(state)
+        compared = comparison_state.methods_of(state)
+        methods = [name for name in compared if not comparison_state.is_variant(name)]
+        if not methods:
+            raise SinewError("The page shows methods with the stages of the character: compare one, too")
         with stepped.kept_frame(scene, armatures):
             return (yield from viewer.page(scene, title, of_each, attached, methods, frames))
 
@@ -255,7 +271,7 @@ def _draw_arrangement(
         column.prop(state, "second", text="")
         (shown,) = comparison_state.shown_methods(state)
         layout.operator("sinew.flip_comparison", text="Flip", icon="UV_SYNC_SELECT")
-        draw_text(layout, "Shown: {method}", method=tr(properties.method_label(shown)))
+        draw_text(layout, "Shown: {method}", method=comparison_state.label_of(shown))
 
 
 def _end() -> None:
