@@ -306,8 +306,8 @@ def _switch(group: bpy.types.NodeTree, which: _Source | bool, off: _Source, on: 
 
 
 def _without_own(group: bpy.types.NodeTree, geometry: _Source, source: bpy.types.Node) -> bpy.types.Node:
-    """Returns the geometry without what Sinew added: a subdivision behind would interpolate it for each of its
-    vertices, and exports would contain it. One node for all of Sinew's names, as each takes its time."""
+    """Returns the geometry without what Sinew added: a subdivision behind would interpolate it for each of
+    its vertices, and exports would contain it. One node for all of Sinew's names, as each takes its time."""
     kind, rest = "GeometryNodeRemoveAttribute", source.outputs[MARK_TO_REMOVE]
     own = add(group, kind, {"Geometry": add(group, kind, {"Geometry": geometry, "Name": rest})})
     if hasattr(own, "pattern_mode"):
