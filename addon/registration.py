@@ -72,7 +72,10 @@ def _parts() -> tuple[Feature, ...]:
 
 
 def _features() -> tuple[Feature, ...]:
-    names = "suggest action_copy inbetween blend corrective compare flex heat auto_mix diagnose bake gltf"
+    names = (
+        "suggest action_copy inbetween blend corrective compare motion_range flex heat auto_mix diagnose "
+        "bake gltf"
+    )
     return tuple(import_module(f".features.{name}.feature", __package__).FEATURE for name in names.split())
 
 

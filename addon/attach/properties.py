@@ -10,17 +10,15 @@ import bpy
 
 from ..skinning.engines import METHODS
 from ..skinning.scale_rule import SCALE_RULES
+from ..skinning.variants import BLENDER, WHOLE
 from . import property_groups, stage_settings
 from .feature import Feature
 from .stage_settings import OFF, OVERRIDABLE, method_items
 
-# A choice in addition to Sinew's methods: the Armature modifier as it is in the file.
-BLENDER = "blender"
-
 
 def method_label(name: str) -> str:
-    if name == BLENDER:
-        return "Armature modifier"
+    if name in WHOLE:
+        return WHOLE[name]
     return METHODS[name].label if name in METHODS else "a method of a newer Sinew"
 
 

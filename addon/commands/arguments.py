@@ -14,6 +14,7 @@ from ..base.frames import parse_frames
 from ..base.options import options_of
 from ..base.output import file_to_write, folder_to_write
 from ..skinning import parameters
+from ..skinning.variants import Variant, parse_list
 
 FILES = ".blend, .glb, .gltf or .fbx"
 
@@ -94,6 +95,14 @@ def methods(text: str) -> list[str]:
     """The type of an argument that names methods of `sinew methods`, or the Armature modifier."""
     read = one_of([*(method.name for method in sinew.methods()), "blender"])
     return [read(name.strip()) for name in text.split(",")]
+
+
+def variants(text: str) -> list[Variant]:
+    """The type of an argument of variants that commas divide."""
+    try:
+        return parse_list(text)
+    except WrongUse as error:
+        raise argparse.ArgumentTypeError(str(error)) from None
 
 
 def add_file(parser: argparse.ArgumentParser) -> None:

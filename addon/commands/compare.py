@@ -16,6 +16,8 @@ from ..features.measure.diagnostics import USUAL_INFLUENCES
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
+from ..skinning.variants import SYNTAX, parse_list
+from . import contact_sheet
 from .arguments import (
     add_engine,
     add_files,
@@ -25,7 +27,9 @@ from .arguments import (
     add_viewer,
     check_viewer,
     count_or_none,
+    file_named,
     pixels,
+    variants,
 )
 from .console import Console
 
@@ -33,6 +37,7 @@ if TYPE_CHECKING:
     from ..features.measure.subjects import Subject
 
 
+SHEET = "blender, dq, cor, dq+twist_spread+bulge_limit, dq+twist_spread+delta_mush, recommended"
 SUMMARY = "show and measure methods beside each other"
 HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
@@ -48,6 +53,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--methods",
         help="of `sinew methods`, recommended, and blender for the Armature modifier (default: "
         f"{','.join(USUAL_METHODS)})",
+    )
+    parser.add_argument(
+        "--variants",
+        type=variants,
+        metavar="VARIANTS",
+        help=f"in the place of --methods, divided by commas: {SYNTAX}",
     )
     parser.add_argument(
         "--reference",
@@ -72,7 +83,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="how many bones a vertex may have before it is reported (default: %(default)s)",
     )
     parser.add_argument(
-        "--size", type=pixels, default=480, help="pixels of each picture (default: %(default)s)"
+        "--size", type=pixels, help="pixels of each picture (default: 480; 240 of a contact sheet)"
     )
     add_engine(parser)
     parser.add_argument("--out", type=folder_to_write, metavar="DIR", help="folder for the pages")
@@ -81,6 +92,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "write a page in which the character of the file moves and turns in the browser; without --out it "
         "alone",
     )
+    parser.add_argument(
+        "--sheet",
+        type=file_named(".png"),
+        metavar="SHEET.png",
+        help="write a contact sheet: the joints of the character bent in stated poses, a row for each "
+        f"variant (default: {SHEET})",
+    )
     add_set(parser)
 
 
@@ -88,12 +106,15 @@ def run(args: argparse.Namespace, console: Console) -> int:
     from ..deform import characters
     from ..features.pages import render
 
+    if args.sheet is not None:
+        return _run_sheet(args, console)
     named = USUAL_METHODS if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference], PRESETS)
+    _check_variants(args)
     characters.set_parameters(args.set)
     if args.out is None and args.viewer is None:
-        raise WrongUse("expected --out, --viewer or both")
+        raise WrongUse("expected --out, --viewer or both; or --sheet")
     check_viewer(args.viewer, len(args.files))
     if args.out is not None:
         require_jinja()
@@ -112,6 +133,60 @@ def run(args: argparse.Namespace, console: Console) -> int:
             complete = False
         failed |= not complete
     return 1 if failed else 0
+
+
+def _run_sheet(args: argparse.Namespace, console: Console) -> int:
+    given = {"--out": args.out, "--viewer": args.viewer, "--methods": args.methods, "--frames": args.frames}
+    for option in (option for option, value in given.items() if value is not None):
+        raise WrongUse(f"--sheet: {option} does not go with it; --variants names its rows")
+    if len(args.files) > 1:
+        raise WrongUse(f"{args.sheet}: --sheet writes the sheet of a single file")
+    _check_variants(args)
+    contact_sheet.require_pillow()
+    try:
+        return 0 if _write_sheet(args.files[0], args, console) else 1
+    except SinewError as error:
+        console.complain(error)
+        return 1
+
+
+def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool:
+    """Returns False where a mesh was left out."""
+    import bpy
+
+    from ..deform import characters
+    from ..features.pages import contact_sheet as drawn
+    from ..io import files
+
+    console.note_on(path, files.open_file(path))
+    variants = args.variants or parse_list(SHEET)
+    found = characters.deformed_meshes_of(bpy.context.scene, path, args.object)
+    own = {each: characters.own_variants(found, each) for each in variants}
+    meshes, left_out = characters.taken(found, path, ["dq"])
+    for reason in left_out:
+        console.complain(f"{path}: left out: {reason}")
+    rows = [characters.with_presets(own[each]) for each in variants]
+    console.note_on(path, characters.sentences())
+    joints = drawn.columns(meshes)
+    count = len(rows) * len(joints)
+    steps = drawn.cells(joints, rows, args.size or 240)
+    cells = list(console.progress(steps, count, f"Drawing {path.name}"))
+    columns = [(joint.joint, joint.pose.name) for joint in joints]
+    contact_sheet.write(args.sheet, path.stem, [each.title for each in variants], columns, cells)
+    console.say(str(args.sheet))
+    return not left_out
+
+
+def _check_variants(args: argparse.Namespace) -> None:
+    if args.variants is None:
+        return
+    others = {
+        "--methods": args.methods is not None,
+        "--set": bool(args.set),
+        "--viewer": args.viewer is not None,
+    }
+    for option in (option for option, is_given in others.items() if is_given):
+        raise WrongUse(f"--variants names whole choices, which {option} does not take; leave one away")
 
 
 def _check_names(files: list[Path]) -> None:
@@ -174,18 +249,21 @@ def _compare(
     scene = bpy.context.scene
     frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
     characters.set_frame(scene, frames[0])
-    played = [*methods, args.reference]
-    meshes, left_out = characters.deformable_meshes(scene, path, played, args.object)
+    found = characters.deformed_meshes_of(scene, path, args.object)
+    own = {each.key: characters.own_variants(found, each) for each in args.variants or ()}
+    methods = list(own) or methods
+    named = {each.method for of_meshes in own.values() for each in of_meshes.values()} or methods
+    meshes, left_out = characters.taken(found, path, [*named, args.reference])
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
     subject = subjects.gather(scene, meshes)
     folder, sheets = args.out / as_file_name(path.stem), []
-    with characters.kept_presets(meshes, played):
+    with characters.kept_choices(meshes, [*named, args.reference], own):
         console.note_on(path, characters.sentences())
-        comparison = _measure(path, subject, methods, frames, args, console)
+        comparison = _measure(path, subject, _labels(methods, args), frames, args, console)
         write_text(folder / "metrics.json", comparison.to_json())
         if engine is not None:
-            studio = render.Studio(scene, subject.meshes, engine, args.size)
+            studio = render.Studio(scene, subject.meshes, engine, args.size or 480)
             illustrator = illustrate.Illustrator(subject, comparison, studio, folder / "pictures")
             illustrator.plan(args.pictures)
             count = illustrator.picture_count
@@ -198,18 +276,27 @@ def _compare(
     return not left_out
 
 
+def _labels(methods: list[str], args: argparse.Namespace) -> dict[str, str]:
+    """By the names of methods, or by the keys of variants."""
+    from ..attach import properties
+
+    if args.variants is None:
+        return {name: properties.method_label(name) for name in methods}
+    return {each.key: each.title for each in args.variants}
+
+
 def _measure(
     path: Path,
     subject: Subject,
-    methods: list[str],
+    labels: dict[str, str],
     frames: list[float],
     args: argparse.Namespace,
     console: Console,
 ) -> Comparison:
-    from ..attach import properties
     from ..deform import characters
     from ..features.measure import subjects
 
+    methods = list(labels)
     batches = subjects.batches(subject, frames, len(methods) + 1)
     measured = subjects.Measurements.of(methods)
     rest: RestFacts | None = None
@@ -220,7 +307,7 @@ def _measure(
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],
-        {name: name.title() if name in PRESETS else properties.method_label(name) for name in methods},
+        labels,
         args.reference,
         characters.length_unit(subject.scene),
         rest,

@@ -6,6 +6,7 @@ import math
 
 import sinew
 
+from ..skinning import variants
 from ..skinning.engines import METHODS, Engine
 from ..skinning.parameters import PRESETS
 from .arguments import add_json
@@ -27,6 +28,12 @@ def run(args: argparse.Namespace, console: Console) -> int:
                 _facts(method) | {"group": method.group, "needs": list(method.needs)} for method in methods
             ],
             "stages": [_facts(stage) for stage in stages],
+            "variants": {
+                "syntax": variants.SYNTAX,
+                "pattern": variants.pattern(),
+                "alone": dict(variants.WHOLE),
+                "settings": {name: list(values) for name, values in variants.SETTINGS.items()},
+            },
             "presets": [{"name": name, "description": text} for name, text in PRESETS.items()],
         }
         console.say_json(rows)
@@ -43,6 +50,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
             [(s.name, ", ".join(_parameters(s)), s.description) for s in stages],
         )
         console.table(("preset", "what it chooses"), list(PRESETS.items()))
+        console.say(f"A variant is {variants.SYNTAX}.")
     return 0
 
 

@@ -12,6 +12,7 @@ from ..base.errors import SinewError, about
 from ..base.names import as_file_name
 from ..base.output import write_whole
 from ..skinning.parameters import PRESETS
+from ..skinning.variants import BLENDER
 from .arguments import add_file, add_frames, add_method, add_object, add_set, file_named
 from .console import Console
 from .outcome import use_method
@@ -37,7 +38,6 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(args: argparse.Namespace, console: Console) -> int:
     import bpy
 
-    from ..attach import properties
     from ..deform import characters
     from ..io import files
 
@@ -65,7 +65,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
     for frame in console.progress(frames, len(frames), f"Deforming {args.file.name}"):
         characters.set_frame(bpy.context.scene, frame)
         for obj in taken:
-            if args.method != properties.BLENDER and not obj.sinew.enabled:
+            if args.method != BLENDER and not obj.sinew.enabled:
                 raise SinewError(f"{args.file}: frame {frame}: {obj.sinew.error}")
             points[keys[obj]].append(characters.final_points(obj))
     arrays = {name: _stack(name, per_frame, frames) for name, per_frame in points.items()}

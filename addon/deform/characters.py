@@ -10,13 +10,13 @@ from typing import TypeAlias
 import bpy
 import numpy as np
 
-from ..attach import attach, properties, setting_animation, stage_settings
-from ..attach.properties import BLENDER
+from ..attach import attach, properties, setting_animation, variant_settings
 from ..base import interrupt
 from ..base.errors import SinewError, WrongUse
 from ..io import mesh_io
 from ..skinning import parameters
 from ..skinning.parameters import Value
+from ..skinning.variants import BLENDER, FILE, Variant
 from ..skinning.vectors import transformed_axes
 from . import lifecycle, session
 
@@ -136,28 +136,64 @@ _own: dict[bpy.types.Object, dict[str, Value]] = {}
 
 
 @contextmanager
-def kept_presets(meshes: Sequence[bpy.types.Object], names: Iterable[str]) -> Iterator[None]:
+def kept_choices(
+    meshes: Sequence[bpy.types.Object],
+    names: Iterable[str],
+    variants: Mapping[str, Mapping[bpy.types.Object, Variant]] = MappingProxyType({}),
+) -> Iterator[None]:
     """Context in which each preset among the names stands for what it chooses for the meshes at the
-    beginning, and with every other method they have their own settings.
+    beginning, each key of `variants` for these, and with every other method they have their own settings.
 
     Raises SinewError where it can not choose, or where a setting that it sets is keyed.
     """
+    chosen: dict[str, dict[bpy.types.Object, tuple[str, Mapping[str, Value]]]] = {}
+    presets = [name for name in names if name in choosers]
     try:
-        for name in names:
-            if name in choosers:
-                found, values, failed = _with_presets([(obj, name) for obj in meshes], {})
-                for error in failed.values():
-                    raise error
-                for obj in meshes:
-                    keyed = setting_animation.keyed(obj, values[obj])
-                    if keyed:
-                        raise SinewError(f"{obj.name}: {keyed} is keyed; {name} can not be compared with it")
-                    _own[obj] = {each: _stored(obj, each) for each in values[obj]}
-                _kept[name] = {obj: (method, values[obj]) for obj, method in found}
+        for name in presets:
+            found, values, failed = _with_presets([(obj, name) for obj in meshes], {})
+            for error in failed.values():
+                raise error
+            chosen[name] = {obj: (method, values[obj]) for obj, method in found}
+        for key, of_meshes in variants.items():
+            chosen[key] = {
+                obj: chosen.get(of_meshes[obj].method, {}).get(obj) or _as_values(of_meshes[obj])
+                for obj in meshes
+            }
+        for name, of_objects in chosen.items():
+            for obj, (_method, own) in of_objects.items():
+                keyed = setting_animation.keyed(obj, own)
+                if keyed:
+                    raise SinewError(f"{obj.name}: {keyed} is keyed; {name} can not be compared with it")
+                # The first that sets it is before any has.
+                _own.setdefault(obj, {})
+                _own[obj] |= {
+                    each: variant_settings.stored(obj, each) for each in own if each not in _own[obj]
+                }
+        _kept.update(chosen)
         yield
     finally:
         _kept.clear()
         _own.clear()
+
+
+def _as_values(variant: Variant) -> tuple[str, Mapping[str, Value]]:
+    return variant.method, variant.all_values | variant.settings
+
+
+def own_variants(meshes: Sequence[bpy.types.Object], variant: Variant) -> dict[bpy.types.Object, Variant]:
+    """Returns the variant for each mesh; FILE stands for what each has now."""
+    return {obj: variant_settings.read(obj) if variant.method == FILE else variant for obj in meshes}
+
+
+def with_presets(variants: Mapping[bpy.types.Object, Variant]) -> dict[bpy.types.Object, Variant]:
+    """Returns the same with what each preset chooses. Raises SinewError where it can not choose."""
+    wanted = [(obj, variant.method) for obj, variant in variants.items() if variant.method in choosers]
+    if not wanted:
+        return dict(variants)
+    found, values, failed = _with_presets(wanted, {})
+    for error in failed.values():
+        raise error
+    return variants | {obj: Variant.of_values(method, values[obj]) for obj, method in found}
 
 
 # The method of meshes while a preset is being chosen.
@@ -254,30 +290,17 @@ def _choose(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> 
     setting_animation.remove_keys(obj, "sinew.method")
     properties.of(obj).method = method
     for name, value in values.items():
-        owner, own_name = _place(obj, name)
         setting_animation.remove_keys(obj, f"sinew.{name}")
-        stored = stage_settings.OFF if value == parameters.OFF else value
-        setattr(owner, own_name, stored)
+        variant_settings.assign(obj, name, value)
     if not properties.of(obj).enabled:
         properties.of(obj).enabled = True
-
-
-def _place(obj: bpy.types.Object, name: str) -> tuple[bpy.types.PropertyGroup, str]:
-    """The settings that have a parameter, and its name there."""
-    owner, _dot, own = name.partition(".")
-    return getattr(properties.of(obj), owner), own
-
-
-def _stored(obj: bpy.types.Object, name: str) -> Value:
-    stored: Value = getattr(*_place(obj, name))
-    return parameters.OFF if stored == stage_settings.OFF else stored
 
 
 def _check_groups(values: Mapping[str, Value]) -> None:
     """Raises SinewError for a vertex group that no mesh of the file has; some meshes may lack it."""
     known = parameters.by_full_name()
     for name, value in values.items():
-        if known[name].kind == "vertex_group" and value:
+        if name in known and known[name].kind == "vertex_group" and value:
             meshes = [obj for obj in bpy.data.objects if obj.type == "MESH"]
             if not any(value in mesh.vertex_groups for mesh in meshes):
                 raise SinewError(f"{name}: no mesh has a vertex group {value!r}")
@@ -297,22 +320,33 @@ def deformable_meshes(
 
     Raises SinewError that names the file `path` where there is none.
     """
+    return taken(deformed_meshes_of(scene, path, name), path, methods)
+
+
+def deformed_meshes_of(scene: bpy.types.Scene, path: Path, name: str | None = None) -> list[bpy.types.Object]:
+    """The same as deformed_meshes(); an error names the file."""
     try:
-        meshes = deformed_meshes(scene, name)
+        return deformed_meshes(scene, name)
     except SinewError as error:
         raise SinewError(f"{path}: {error}") from None
-    methods = [_FIRST if method in choosers else method for method in methods]
-    taken, reasons = [], []
+
+
+def taken(
+    meshes: Sequence[bpy.types.Object], path: Path, methods: Iterable[str]
+) -> tuple[list[bpy.types.Object], list[str]]:
+    """The same as deformable_meshes(), for some of deformed_meshes()."""
+    methods = list(dict.fromkeys(_FIRST if method in choosers else method for method in methods))
+    found, reasons = [], []
     for obj in meshes:
         try:
             for method in methods:
                 use_method(obj, method)
-            taken.append(obj)
+            found.append(obj)
         except SinewError as error:
             reasons.append(str(error))
-    if not taken:
+    if not found:
         raise SinewError(f"{path}: no mesh that Sinew can drive: {reasons[0]}")
-    return taken, reasons
+    return found, reasons
 
 
 def length_unit(scene: bpy.types.Scene) -> str:

@@ -146,6 +146,8 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
         Entry("sinew.end_comparison"),
         Entry("sinew.recommend", icon="SOLO_ON"),
         *_over("sinew.suggest", "Suggest a Method"),
+        Entry("sinew.motion_range", icon="ARMATURE_DATA"),
+        Entry("sinew.end_motion_range"),
         Entry("sinew.flex", "Flex: Bend Every Joint"),
         Entry("sinew.save_flex", "Save Flex as Page\u2026", icon="URL"),
     )

@@ -118,6 +118,9 @@ SWING, TWIST = 60.0, 90.0
 MOST = 150.0
 LEAST = 5.0
 
+# Fewer knuckles are no line; the sine of the mean angle by which fingers that are bent at rest bend.
+FEWEST_FINGERS, RELAXED = 3, 0.03
+
 # The sine of an angle between a bone and its limb that is rounding.
 SAME = 1e-6
 
@@ -211,12 +214,13 @@ class Battery:
         self._joints = [int(bone) for bone in np.flatnonzero(moving) if bones.deforming_parents[bone] >= 0]
         self._words = [words_of(name) for name in bones.names]
 
-    def poses(self) -> list[Pose]:
+    def poses(self, figure: Mapping[str, tuple[Move, ...]] = FIGURE) -> list[Pose]:
+        """figure: what a figure that stands upright does"""
         limited = [bone for bone in self._joints if self._bones.names[bone] in self._limits]
         free = [bone for bone in self._joints if bone not in limited]
         found = [*self._within_limits(limited)]
         if self._directions is not None:
-            for name, moves in FIGURE.items():
+            for name, moves in figure.items():
                 found.append(Pose(name, dict(self._moved(moves, free))))
             # Faces and hair keep still.
             face = {bone for bone in free if any(self._roles[above] == "neck" for above in self._above(bone))}
@@ -414,12 +418,40 @@ class Battery:
         """The axis that a limb bends about: as it is bent at rest, else toward a direction; and the angle by
         which it is bent at rest, in radians."""
         along, above = self._along[bone], int(self._bones.deforming_parents[bone])
+        knuckles = self._knuckles(bone, toward) if self._roles[bone] == "finger" else None
+        if knuckles is not None:
+            return _unit(_without(knuckles, along)), 0.0
         bent = np.cross(self._along[above], along)
         is_limb = self._roles[bone] in ("forearm", "shin", "finger", "thumb")
         if is_limb and self._roles[above] != "hand" and np.linalg.norm(bent) > math.sin(math.radians(8.0)):
             return _unit(bent), math.atan2(np.linalg.norm(bent), self._along[above] @ along)
         axis = np.cross(along, _unit(toward))
         return (_unit(axis) if np.linalg.norm(axis) > 0.1 else None), 0.0
+
+    def _knuckles(self, bone: int, toward: np.ndarray) -> np.ndarray | None:
+        """The line of a hand's knuckles, which all of its fingers bend about: as they are bent at rest, else
+        toward a direction; None where there are too few."""
+        hand = self._hand_of(bone)
+        fingers = [each for each in self._of_role("finger") if self._hand_of(each) == hand]
+        above = self._bones.deforming_parents
+        first = [each for each in fingers if self._roles[int(above[each])] != "finger"]
+        if len(first) < FEWEST_FINGERS:
+            return None
+        heads = self._heads[first] - self._heads[first].mean(axis=0)
+        line = np.linalg.svd(heads)[2][0]
+        bent = [
+            np.cross(self._along[int(above[each])], self._along[each])
+            for each in fingers
+            if each not in first
+        ]
+        at_rest = float(np.sum(bent, axis=0) @ line) if bent else 0.0
+        if abs(at_rest) < RELAXED * len(bent):
+            at_rest = float(np.cross(self._along[fingers], _unit(toward)).sum(axis=0) @ line)
+        return line if at_rest > 0.0 else -line
+
+    def _hand_of(self, bone: int) -> int:
+        """What carries the bone's finger."""
+        return next((each for each in self._above(bone) if self._roles[each] != "finger"), -1)
 
 
 def _side_of(word: str) -> int:

@@ -21,11 +21,14 @@ from ...deform.bound import Bound
 from ...deform.skinned_object import SkinnedObject
 from ...io import armature_io, mesh_io, spaces
 from ...skinning import influences
+from ...skinning.engines import ENGINES
 from ...skinning.rig import Bones
+from ...skinning.scale_rule import BLENDER_4
 from ...skinning.skin_stack import SkinStack
 from ...skinning.stages import StageValues
 from ...skinning.surface import Surface, joined
 from ...skinning.twist_spread import NOT_TOLD, TwistInputs
+from ...skinning.variants import Variant
 from ...skinning.vectors import is_same_space, transformed, transformed_axes
 from .metrics import FrameOfRig, Gauge, Measured, Pose, Shape
 
@@ -71,6 +74,44 @@ class _Inputs:
         own = stage_settings.method_values(properties.of(obj), (method,))
         frames = [frame and replace(frame, method=method, mix="", parameters=own) for frame in self.frames]
         return replace(self, frames=frames)
+
+    def under_variant(self, variant: Variant) -> Self:
+        """The same under a method with its stages, or under the Armature modifiers."""
+        if variant.method == properties.BLENDER:
+            return self.under(properties.BLENDER)
+        obj, is_engine = self.part.obj, variant.method in ENGINES
+        scale = properties.of(obj).storage.world_scale or 1.0
+        own = {
+            name: value / scale if name in stage_settings.LENGTHS else value
+            for name, value in variant.all_values.items()
+        }
+        of_method = {name: value for name, value in own.items() if name.startswith(f"{variant.method}.")}
+        frames: pose.Frames = []
+        for skin, frame in zip(self.part.skin_stack.skins, self.frames, strict=False):
+            if frame is None:
+                frames.append(None)
+                continue
+            deformer, rule = skin.deformer, variant.settings.get("scale_rule", frame.scale_rule)
+            is_mixed = variant.mix and deformer.mix_weights is not None and not is_engine
+            bones = frame.pose
+            if is_engine:
+                rule, bones = BLENDER_4.name, armature_io.decomposed(bones, deformer.bones.parents)
+            of_mix = {name: value for name, value in own.items() if name.startswith(f"{variant.mix}.")}
+            frames.append(
+                replace(
+                    frame,
+                    method=variant.method,
+                    mix=variant.mix if is_mixed else "",
+                    parameters=of_method | of_mix,
+                    scale_rule=rule,
+                    pose=bones,
+                )
+            )
+        stages = {
+            stage: {name: own[f"{stage}.{name}"] for name in values}
+            for stage, values in variant.stage_values.items()
+        }
+        return replace(self, frames=frames, stages={} if is_engine else stages)
 
     def of_mix(self, second: str) -> Self:
         """Under the first method of a mix or, where one is given, under the second. Armature modifiers with a
@@ -242,6 +283,12 @@ class Moment:
         """
         inputs = self.inputs if stages is None else [replace(own, stages=stages) for own in self.inputs]
         points = replace(self, inputs=inputs).points([method] * len(inputs))
+        return Measured(self.pose, Shape(self.subject.gauge.surface, points), None)
+
+    def measured_under(self, variants: Sequence[Variant]) -> Measured:
+        """Measures the shape under a variant of each part."""
+        pairs = zip(self.inputs, variants, strict=True)
+        points = _shape_of([own.under_variant(variant) for own, variant in pairs], self.worlds)
         return Measured(self.pose, Shape(self.subject.gauge.surface, points), None)
 
 

@@ -10,6 +10,10 @@ import numpy as np
 VIEW_DIRECTION = np.array([0.45, -1.0, 0.22]) / np.linalg.norm([0.45, -1.0, 0.22])
 # The share of the mesh's diagonal that close-ups show.
 CLOSE_UP = 0.28
+# The cosine of the angle up to which a rotation about a limb is a twist; the share of the whole view's
+# direction in a view along an axis; the room around a joint, as a share of its size; the share of a mesh that
+# hides nothing of note.
+ALONG, TILT, JOINT_MARGIN, HIDES = 0.8, 0.2, 0.04, 0.02
 
 
 @dataclass(frozen=True)
@@ -74,25 +78,64 @@ def close_view(points: np.ndarray, targets: np.ndarray) -> View:
     return View(_clearest_direction(points - target, radius), target, 2 * radius, 2 * radius, diagonal)
 
 
-def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
-    """The unit direction from which the origin is least hidden; of equals, the one nearest to the whole
-    view's.
+def joint_view(points: np.ndarray, targets: np.ndarray, axis: np.ndarray, limb: np.ndarray) -> View:
+    """Returns a square view of all of `targets` [m, 3] from the side: along the axis that a joint is rotated
+    about, or across the limb where that is the axis.
 
-    `points` hide the origin where they are in front of the sphere of `radius` around it.
+    points      [n, 3], what may hide them
+    axis, limb  [3], unit
     """
+    low, high = targets.min(axis=0), targets.max(axis=0)
+    centre, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    if abs(axis @ limb) > ALONG:
+        right, up = camera_axes(limb)
+        angles = np.linspace(0.0, 2.0 * np.pi, 12, endpoint=False)
+        sides = [np.cos(angle) * right + np.sin(angle) * up for angle in angles]
+    else:
+        # A little of its depth is seen, too.
+        sides = [_unit(sign * axis + TILT * VIEW_DIRECTION) for sign in (1.0, -1.0)]
+    direction = _clearest(points - centre, radius, sides, HIDES)
+    seen = targets @ np.stack([*camera_axes(direction), direction], axis=1)
+    low, high = seen.min(axis=0), seen.max(axis=0)
+    right, up = camera_axes(direction)
+    middle = (low + high) / 2
+    size = (1.0 + 2.0 * JOINT_MARGIN) * max(float((high - low)[:2].max()), 1e-6)
+    target = middle[0] * right + middle[1] * up + middle[2] * direction
+    return View(direction, target, size, size, float(np.linalg.norm(np.ptp(points, axis=0))) + size)
+
+
+def _clearest_direction(points: np.ndarray, radius: float) -> np.ndarray:
+    """As _clearest(), among directions all around."""
     azimuth, elevation = np.meshgrid(np.linspace(0, 2 * np.pi, 16, endpoint=False), np.radians([10, 35, -15]))
     directions = np.stack(
         [np.sin(azimuth) * np.cos(elevation), -np.cos(azimuth) * np.cos(elevation), np.sin(elevation)],
         axis=-1,
     )
-    candidates = [VIEW_DIRECTION, *directions.reshape(-1, 3)]
+    return _clearest(points, radius, [VIEW_DIRECTION, *directions.reshape(-1, 3)])
+
+
+def _clearest(
+    points: np.ndarray, radius: float, candidates: Sequence[np.ndarray], alike: float = 0.0
+) -> np.ndarray:
+    """The one of the directions, unit, from which the origin is least hidden; of equals, the one nearest to
+    the whole view's.
+
+    `points` hide the origin where they are in front of the sphere of `radius` around it.
+
+    alike  a share of the points that makes no difference
+    """
 
     def hidden(direction: np.ndarray) -> float:
         along = points @ direction
         across = np.linalg.norm(points - np.outer(along, direction), axis=1)
-        return float(np.count_nonzero((along > 0.6 * radius) & (across < 0.6 * radius)))
+        count = np.count_nonzero((along > 0.6 * radius) & (across < 0.6 * radius))
+        return float(count // max(alike * len(points), 1.0))
 
     return min(candidates, key=lambda direction: (hidden(direction), -float(direction @ VIEW_DIRECTION)))
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-12)
 
 
 def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -8,7 +8,7 @@ from collections.abc import Iterator
 
 import bpy
 
-from ...attach import properties, stage_settings
+from ...attach import properties, stage_settings, variant_settings
 from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...base.errors import SinewError
@@ -177,7 +177,7 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
 
 def _use(context: bpy.types.Context, choice: Choice) -> None:
     with session.changing(context):
-        recommend.use(character.followers(context), choice)
+        variant_settings.use(character.followers(context), choice.variant)
 
 
 def _used(context: bpy.types.Context) -> set[str]:
@@ -226,7 +226,7 @@ def _draw_method(layout: bpy.types.UILayout, suggestion: Suggestion, method: str
 
 
 def _draw_recommended(layout: bpy.types.UILayout, choice: Choice, used: set[str]) -> None:
-    is_used = used == {choice.method, *choice.stages}
+    is_used = used == {choice.variant.method, *choice.variant.stages}
     layout.operator("sinew.use_recommended", text="Recommended", depress=is_used)
 
 

@@ -9,18 +9,18 @@ from typing import NamedTuple
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, property_groups, stage_settings
+from ...attach import properties
 from ...base.errors import SinewError
 from ...base.phrases import phrase
 from ...base.steps import as_part, result_of
 from ...deform import characters
 from ...io import armature_io
-from ...skinning.parameters import OFF, Value
-from ...skinning.rig import Bones
+from ...skinning.variants import Variant
 from ...ui import stepped
 from ..measure import battery, live
 from ..measure.crossings import crossing_triangles
 from ..measure.measured_on import MeasuredOn, armatures_of
+from ..measure.rigs import posed, rigs_of
 from ..measure.worst_frames import check_measurable, measure_at
 from . import recommendation
 from .recommendation import Choice
@@ -74,14 +74,14 @@ def search(
         named = _in_battery(live.Moment.of(now))
     moments = [_with_crossings(name, moment, k, len(named)) for k, (name, moment) in enumerate(named)]
     if not moments:
-        return Choice("lbs")
+        return Choice(Variant.of("lbs"))
     subject = moments[0].moment.subject
     skin = moments[0].moment.pose.skin
     crude = recommendation.is_crude(skin.influences, subject.gauge.surface.edges)
 
-    def measure(choice: Choice, number: int) -> recommendation.Values:
+    def measure(variant: Variant, number: int) -> recommendation.Values:
         _name, moment, at_rest = moments[number]
-        measured = moment.measured(choice.method, choice.stage_values)
+        measured = moment.measured(variant.method, variant.stage_values)
         crossing = None
         if at_rest is not None and np.isfinite(measured.shape.points).all():
             crossing = _new_crossings(moment, measured.shape.points.T, at_rest)
@@ -112,30 +112,17 @@ def _crossings(moment: live.Moment, points: np.ndarray) -> set[tuple[int, int]]:
 
 def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
     """Returns the poses of the battery, by their names. Several armatures are posed at the same time."""
-    rigs: dict[int, tuple[Bones, set[str], dict[str, np.ndarray]]] = {}
-    for part in now.subject.parts:
-        pairs = attach.replaced_modifiers(part.obj)
-        for skin, (_modifier, replaced) in zip(part.skin_stack.skins, pairs, strict=False):
-            if replaced.armature is not None:
-                limits = armature_io.read_limits(replaced.armature)
-                uid, bones = replaced.armature.session_uid, skin.deformer.bones
-                known = rigs.get(uid, (bones, set(), limits))
-                rigs[uid] = (known[0].with_skin_of(bones) if uid in rigs else bones, *known[1:])
-                known[1].update(skin.deformer.moving_bones)
-    found: dict[tuple[str, ...], list[battery.Pose]] = {}
-    for bones, names, limits in rigs.values():
-        moving = np.array([name in names for name in bones.names], bool)
-        found[bones.names] = battery.Battery(bones, limits, moving).poses()
+    found = {
+        rig.bones.names: battery.Battery(
+            rig.bones, armature_io.read_limits(rig.armature), rig.is_moving
+        ).poses()
+        for rig in rigs_of(now)
+    }
     longest = max(found.values(), key=len, default=[])
-    moments = []
-    for number, (name, _rotations) in enumerate(longest):
-
-        def pose(bones: Bones, number: int = number) -> np.ndarray:
-            own = found.get(bones.names, [])
-            return battery.posed(bones, own[number]) if number < len(own) else bones.rest
-
-        moments.append((name, now.posed(pose)))
-    return moments
+    return [
+        (name, posed(now, {names: own[number] for names, own in found.items() if number < len(own)}))
+        for number, (name, _rotations) in enumerate(longest)
+    ]
 
 
 def _in_frames(
@@ -178,15 +165,4 @@ def _angles(moment: live.Moment) -> np.ndarray:
 def choose(objects: Sequence[bpy.types.Object]) -> characters.Chosen:
     """See characters.choosers."""
     choice = result_of(search(bpy.context.scene, objects))
-    return choice.method, choice.values, choice.text
-
-
-def use(objects: Sequence[bpy.types.Object], choice: Choice) -> None:
-    """Sets it on objects that have Sinew. The caller has them deformed."""
-    for obj in objects:
-        settings = properties.of(obj)
-        property_groups.assign(settings, "method", choice.method)
-        for name, value in choice.values.items():
-            group, _dot, own = name.partition(".")
-            stored: Value = stage_settings.OFF if value == OFF else value
-            property_groups.assign(getattr(settings, group), own, stored)
+    return choice.variant.method, choice.variant.all_values, choice.text

@@ -14,13 +14,10 @@ from dataclasses import dataclass, replace
 from typing import NamedTuple
 
 import numpy as np
-import sinew
 
 from ...base.phrases import Phrase, phrase
-from ...skinning import parameters
 from ...skinning.influences import Influences, owners_of
-from ...skinning.parameters import Value
-from ...skinning.stages import StageValues
+from ...skinning.variants import Variant
 from ..measure.metrics import Measured
 from ..measure.suggestion import LONGEST, TEARS
 
@@ -85,45 +82,10 @@ SAME = 0.01
 
 @dataclass(frozen=True)
 class Choice:
-    """A method, stages with their parameters as they are by default.
+    """why: a sentence for the method and for each stage; empty where nothing bends"""
 
-    why  a sentence for the method and for each stage; empty where nothing bends
-    """
-
-    method: str
-    stages: tuple[str, ...] = ()
+    variant: Variant
     why: tuple[Phrase, ...] = ()
-
-    @property
-    def stage_values(self) -> StageValues:
-        return {name: values_on(name) for name in self.stages}
-
-    @property
-    def values(self) -> dict[str, Value]:
-        """Every parameter of every stage but vertex groups, by its full name."""
-        found: dict[str, Value] = {}
-        for stage in sinew.stages():
-            if stage.name == "mix":
-                found["mix.method"] = parameters.OFF
-                continue
-            own = values_on(stage.name) | {stage.parameters[0].id: stage.name in self.stages}
-            found |= {f"{stage.name}.{name}": value for name, value in own.items()}
-        return found
-
-    @property
-    def label(self) -> Phrase:
-        """As "Centres of Rotation with Twist Spread and Limit Bulge"."""
-        owners: list[sinew.Method | sinew.Stage] = [*sinew.methods(), *sinew.stages()]
-        labels = {each.name: each.label for each in owners}
-        method, stages = phrase(labels[self.method]), [phrase(labels[name]) for name in self.stages]
-        if not stages:
-            return method
-        text = stages[0]
-        for label in stages[1:-1]:
-            text = phrase("{first}, {second}", first=text, second=label)
-        if len(stages) > 1:
-            text = phrase("{first} and {second}", first=text, second=stages[-1])
-        return phrase("{method} with {stages}", method=method, stages=text)
 
     @property
     def text(self) -> Phrase:
@@ -131,32 +93,24 @@ class Choice:
         text = self.why[0] if self.why else phrase("nothing bends here")
         for each in self.why[1:]:
             text = phrase("{first}; {second}", first=text, second=each)
-        return phrase("{method}: {why}", method=self.label, why=text)
-
-
-def values_on(stage: str) -> dict[str, Value]:
-    """Returns the parameters of a stage as they are by default, but on; without vertex groups."""
-    found = next(each for each in sinew.stages() if each.name == stage)
-    switch, *others = found.parameters
-    values: dict[str, Value] = {switch.id: True}
-    return values | {each.id: each.default for each in others if each.default is not None}
+        return phrase("{method}: {why}", method=self.variant.label, why=text)
 
 
 def search(
-    measure: Callable[[Choice, int], Values],
+    measure: Callable[[Variant, int], Values],
     moments: Sequence[tuple[str, np.ndarray]],
     diagonal: float,
     is_crude: bool,
 ) -> Generator[float, None, Choice]:
     """Yields the progress; returns the choice.
 
-    measure   the values of a choice in a moment, as from values_of()
+    measure   the values of a variant in a moment, as from values_of()
     moments   names, for people, with the weights of the limbs
     diagonal  of the rest shape
     is_crude  the weights are
     """
     candidates = [each for each in (*METHODS, *STAGES) if is_crude or not each.crude]
-    best, whys = Choice(METHODS[0].name), {"": phrase(METHODS[0].why)}
+    best, whys = Variant.of(METHODS[0].name), {"": phrase(METHODS[0].why)}
     known: list[Values] = []
     done, of_all = 0, len(candidates) * len(moments)
     for candidate in candidates:
@@ -180,7 +134,7 @@ def search(
             place = phrase(moments[gains.index(max(gains))][0])
             why = phrase("{why} (most: {place})", why=phrase(candidate.why), place=place)
             whys["" if is_method else candidate.name] = why
-    return replace(best, why=tuple(whys.values()) if moments else ())
+    return Choice(best, tuple(whys.values()) if moments else ())
 
 
 def _is_kept(candidate: Candidate, gains: Sequence[float]) -> bool:

@@ -54,7 +54,9 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     choice = yield from as_part(recommend.search(scene, objects, over), 0.0, CHOOSING)
     counted = frames_to_count(frames)
     labels = {method.name: method.label for method in sinew.methods()}
-    suggestion = Suggestion(labels | ({RECOMMENDED: "Recommended"} if choice.stages else {}), frames, 0.0)
+    suggestion = Suggestion(
+        labels | ({RECOMMENDED: "Recommended"} if choice.variant.stages else {}), frames, 0.0
+    )
     moments: dict[float, live.Moment] = {}
     with stepped.kept_frame(scene, armatures):
         for frame in frames:
@@ -97,12 +99,12 @@ def forget() -> None:
 def _measured(method: str, moment: live.Moment, choice: Choice) -> Measured:
     """method: or RECOMMENDED"""
     if method == RECOMMENDED:
-        return moment.measured(choice.method, choice.stage_values)
+        return moment.measured(choice.variant.method, choice.variant.stage_values)
     return moment.measured(method)
 
 
 def _add(suggestion: Suggestion, method: str, frame: float, measured: Measured, choice: Choice) -> None:
-    is_spread = method == RECOMMENDED and "twist_spread" in choice.stages
+    is_spread = method == RECOMMENDED and "twist_spread" in choice.variant.stages
     for name, entry in MEASURED.items():
         # A spread twist is not where the bones are that flips are measured against.
         if name != "flips" or not is_spread:

@@ -10,8 +10,8 @@ import bpy.utils.previews
 import numpy as np
 
 from ..measure.metrics import Measured
+from ..pages import shaded
 from ..pages.views import close_view
-from . import thumbnail
 
 PIXELS = 128
 # Of what other close-ups show: these pictures are smaller.
@@ -46,7 +46,7 @@ def add(scene: bpy.types.Scene, name: str, measured: Measured) -> None:
     view = replace(view, width=NEARER * view.width, height=NEARER * view.height)
     picture = _pictures[scene.session_uid].new(name)
     picture.image_size = picture.icon_size = (PIXELS, PIXELS)
-    pixels = thumbnail.draw(measured.shape, view, PIXELS).ravel()
+    pixels = shaded.draw(measured.shape, view, PIXELS).ravel()
     picture.image_pixels_float.foreach_set(pixels)
     picture.icon_pixels_float.foreach_set(pixels)
 

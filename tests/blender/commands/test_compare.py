@@ -54,6 +54,37 @@ def test_recommended_is_one_of_the_methods(tmp_path):
     assert "delta_mush.factor is keyed" in done.stderr
 
 
+def test_variants_are_whole_choices(tmp_path):
+    """Each has its own stages, whatever the file has, and `file` what that has."""
+    obj, _armature = test_recommended.arm(149.0, axis=1, sides=16, rings=41)
+    properties.of(obj).method = "cor"
+    properties.of(obj).delta_mush.enabled, properties.of(obj).delta_mush.iterations = True, 12
+    path = scenes.save(tmp_path / "arm.blend")
+    options = ("--frames", "11", "--pictures", 0, "--out", tmp_path)
+
+    def summaries(*words):
+        run_sinew("compare", path, *words, *options)
+        return json.loads((tmp_path / "arm" / "metrics.json").read_text(encoding="utf-8"))
+
+    named = "dq, soft=dq+twist_spread, file, blender, cor+delta_mush:iterations=12"
+    found = summaries("--variants", named)
+    assert list(found["methods"].values())[:2] == [
+        "Dual Quaternion",
+        "soft: Dual Quaternion with Twist Spread",
+    ]
+    rows = list(found["summaries"].values())
+    assert rows[2] == rows[4], "as in the file"
+    off = ("--set", "delta_mush=off")
+    alone = summaries("--methods", "dq,blender", *off)["summaries"]
+    assert (rows[0], rows[3]) == (alone["dq"], alone["blender"])
+    assert rows[1] == summaries("--methods", "dq", *off, "--set", "twist_spread=on")["summaries"]["dq"]
+    assert len({str(row) for row in rows}) == 4
+    wrong = run_sinew("compare", path, "--variants", "dq", "--methods", "lbs", *options, status=2)
+    assert "--methods does not take" in wrong.stderr
+    wrong = run_sinew("compare", path, "--variants", "dq+foo", *options, status=2)
+    assert "expected one of mix, twist_spread" in wrong.stderr
+
+
 def test_numbers_are_those_of_the_shapes(tmp_path):
     """Compared with Blender's modifier, in both modes, and with trimesh; a later modifier changes
     nothing."""

@@ -24,6 +24,7 @@ from sinew_addon.features.bake.helper_bones import HelperOptions
 from sinew_addon.features.compare import comparison, comparison_state
 from sinew_addon.features.corrective import corrective_key
 from sinew_addon.features.diagnose import diagnose, mending
+from sinew_addon.features.motion_range import clip
 from sinew_addon.skinning.precompute import precomputations
 from sinew_addon.ui import presets
 from walk_sides import (
@@ -296,6 +297,21 @@ class SinewSide(Side):
             return f"refused: {refused}"
         bpy.context.view_layer.update()
         return f"{name}, {before:.3g} to {after:.3g}"
+
+    def play_motion_range(self, obj: bpy.types.Object, frame: int) -> str:
+        """Goes to a frame of it, and has all come back."""
+        scene, rigs = bpy.context.scene, properties.of(obj).armatures
+        try:
+            for rig in rigs:
+                clip.start(scene, rig, [obj])
+        except SinewError as refused:
+            return f"refused: {refused}"
+        finally:
+            scene.frame_set(frame)
+            for rig in clip.armatures_on():
+                clip.restore(rig)
+            bpy.context.view_layer.update()
+        return f"at {frame}"
 
     def wait(self) -> None:
         """Does what timers of the window do: no object waits for a thread's computation, or for what

@@ -141,8 +141,8 @@ def recommended_by_click() -> Iterator[None]:
     window.press("ESC", RECOMMENDED)
     yield from window.wait()
     choice = recommend.choices[scene().session_uid]
-    wanted = [choice.values[f"{name}.enabled"] for name in names]
-    check("recommended", settings(), [(choice.method, wanted)] * 5)
+    wanted = [choice.variant.all_values[f"{name}.enabled"] for name in names]
+    check("recommended", settings(), [(choice.variant.method, wanted)] * 5)
     check("another than before", settings() != before)
     yield from undo()
     check("recommended, undone", settings(), before)

@@ -114,7 +114,7 @@ def test_without_an_action_poses_are_measured_and_the_file_stays(monkeypatch):
     assert shares == sorted(shares)
     assert shares[-1] == 1.0
     # These poses bend and twist it.
-    assert choice.method != "lbs"
+    assert choice.variant.method != "lbs"
 
 
 def test_add_takes_it_as_a_choice():

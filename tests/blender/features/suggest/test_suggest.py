@@ -14,7 +14,7 @@ from sinew_addon.features.flex import feature as flex_feature
 from sinew_addon.features.measure import worst_frames
 from sinew_addon.features.measure.crossings import crossing_triangles
 from sinew_addon.features.measure.suggestion import CRITERIA, MEASURED, Suggestion
-from sinew_addon.features.suggest import recommend, suggest, thumbnail, worst_pictures
+from sinew_addon.features.suggest import recommend, suggest, worst_pictures
 from sinew_addon.io import actions
 from sinew_addon.ui import stepped
 
@@ -56,10 +56,13 @@ def test_one_combination_is_recommended_and_a_click_uses_it():
     bpy.ops.sinew.suggest()
     suggestion, choice = found(), recommend.choices[bpy.context.scene.session_uid]
     assert choice == recommend.result_of(recommend.search(bpy.context.scene, [obj]))
-    assert choice.stages == ("twist_spread",)
+    assert choice.variant.stages == ("twist_spread",)
     assert suggest.RECOMMENDED in suggestion.methods
     bpy.ops.sinew.use_recommended()
-    assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (choice.method, True)
+    assert (properties.of(obj).method, properties.of(obj).twist_spread.enabled) == (
+        choice.variant.method,
+        True,
+    )
     bpy.context.scene.frame_set(11)
     measured = scenes.measure(obj).measured
     known = suggestion.worst[suggest.RECOMMENDED, "volume"]
@@ -104,9 +107,9 @@ def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
     monkeypatch.setattr(worst_pictures, "are_drawn", lambda: True)
     seen = []
     monkeypatch.setattr(
-        worst_pictures.thumbnail,
+        worst_pictures.shaded,
         "draw",
-        lambda *args, own=thumbnail.draw: seen.append(own(*args)) or seen[-1],
+        lambda *args, own=worst_pictures.shaded.draw: seen.append(own(*args)) or seen[-1],
     )
     list(suggest.scan(scene, [obj], "SCENE"))
     assert len(seen) == len(found().methods)

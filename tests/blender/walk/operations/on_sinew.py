@@ -346,6 +346,13 @@ def mend(w: Walker, r: random.Random) -> None:
 
 
 @operation(0.5)
+def play_motion_range(w: Walker, r: random.Random) -> None:
+    obj, frame = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.randint(1, 40)
+    w.skip_if(w.compared)
+    and_undo(w, r, lambda: w.side.play_motion_range(obj, frame))
+
+
+@operation(0.5)
 def bake_to_bones(w: Walker, r: random.Random) -> None:
     obj, motion = w.mesh(r, lambda o: w.side.is_on(o) and o.visible_get()), r.choice(("keys", "pose"))
     w.skip_if(w.compared)

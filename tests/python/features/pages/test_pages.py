@@ -13,6 +13,7 @@ from sinew_addon.commands import golden
 from sinew_addon.features.measure.comparison import Comparison, RestFacts
 from sinew_addon.features.measure.heat_scale import HeatScale, diverging, linear, viridis
 from sinew_addon.features.measure.metrics import METRICS, Summary
+from sinew_addon.features.pages import views
 from sinew_addon.features.pages.page import legend_texts, page
 from sinew_addon.features.pages.plots import line_plot
 from sinew_addon.features.pages.views import View
@@ -224,3 +225,17 @@ def test_settings_of_golden_pictures_are_read_as_written(tmp_path):
     path.write_text(json.dumps(older | {"set": [1]}))
     with pytest.raises(SinewError, match="make the pictures again"):
         golden.RenderSettings.read(tmp_path)
+
+
+def test_a_joint_is_seen_from_the_side_where_its_bend_shows():
+    """Along the axis of a bend, from the side that nothing hides; across the limb where it is twisted."""
+    arm = np.stack([np.linspace(-1.0, 1.0, 21), np.zeros(21), np.zeros(21)], axis=1)
+    wall = np.random.default_rng(1).uniform(-0.5, 0.5, (200, 3)) * (1.0, 0.0, 1.0)
+    x, y = np.array([1.0, 0.0, 0.0]), np.array([0.0, 1.0, 0.0])
+    for place in (-3.0, 3.0):
+        view = views.joint_view(np.concatenate([arm, wall + place * y]), arm, y, x)
+        assert view.direction[1] * place < -0.8 * abs(place)
+        assert view.width == view.height > 1.9
+        np.testing.assert_allclose(view.target, 0.0, atol=1e-9)
+    twisted = views.joint_view(arm, arm, x, x)
+    assert abs(twisted.direction @ x) < 1e-6

@@ -3,8 +3,8 @@
 
 import numpy as np
 from sinew_addon.features.measure.metrics import Shape
+from sinew_addon.features.pages import shaded
 from sinew_addon.features.pages.views import View
-from sinew_addon.features.suggest import thumbnail
 from sinew_addon.skinning.surface import Surface
 
 FRONT = View(np.array([0.0, -1.0, 0.0]), np.zeros(3), 2.0, 2.0, 4.0)
@@ -23,7 +23,7 @@ def drawn(*parts):
         triangles += [tuple(corner + len(points) for corner in face) for face in faces]
         points += own
     surface = Surface(len(points), np.array(triangles, np.int32), np.empty((0, 2), np.int32))
-    return thumbnail.draw(Shape(surface, np.array(points, float)), FRONT, 16)
+    return shaded.draw(Shape(surface, np.array(points, float)), FRONT, 16)
 
 
 def test_what_is_seen_is_where_it_is():

@@ -1,0 +1,53 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Variants in an object's settings: what is set there as a variant, and back."""
+
+from collections.abc import Iterable
+
+import bpy
+
+from ..skinning.parameters import OFF, Value
+from ..skinning.variants import BLENDER, SETTINGS, Variant
+from . import properties, property_groups, stage_settings
+
+
+def read(obj: bpy.types.Object) -> Variant:
+    """Returns what deforms an object by its settings: with Sinew off, the Armature modifier."""
+    if not properties.has_sinew(obj) or not properties.of(obj).enabled:
+        return Variant.of(BLENDER)
+    settings = properties.of(obj)
+    values: dict[str, Value] = {name: getattr(settings, name) for name in SETTINGS}
+    for owner, group in properties.SETTING_GROUPS.items():
+        own = getattr(settings, owner)
+        values |= {f"{owner}.{name}": getattr(own, name) for name in group.__annotations__}
+    return Variant.of(settings.method, stage_settings.names_on(settings), values)
+
+
+def use(objects: Iterable[bpy.types.Object], variant: Variant) -> None:
+    """Sets a method with its stages, or the Armature modifier, on objects that have Sinew. The caller has
+    them deformed."""
+    for obj in objects:
+        settings = properties.of(obj)
+        property_groups.assign(settings, "enabled", variant.method != BLENDER)
+        if variant.method == BLENDER:
+            continue
+        property_groups.assign(settings, "method", variant.method)
+        for name, value in (variant.all_values | variant.settings).items():
+            assign(obj, name, value)
+
+
+def assign(obj: bpy.types.Object, name: str, value: Value) -> None:
+    """Sets a parameter, or one of SETTINGS, by its full name."""
+    owner, own = place(obj, name)
+    property_groups.assign(owner, own, stage_settings.OFF if value == OFF else value)
+
+
+def place(obj: bpy.types.Object, name: str) -> tuple[bpy.types.PropertyGroup, str]:
+    """The settings that have a parameter or one of SETTINGS, and its name there."""
+    owner, dot, own = name.partition(".")
+    settings = properties.of(obj)
+    return (getattr(settings, owner), own) if dot else (settings, name)
+
+
+def stored(obj: bpy.types.Object, name: str) -> Value:
+    value: Value = getattr(*place(obj, name))
+    return OFF if value == stage_settings.OFF else value

@@ -1,0 +1,58 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""The armatures of a moment, with the bones that move vertices, and the moment in other poses of these."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+import bpy
+import numpy as np
+
+from ...attach import attach
+from ...skinning.rig import Bones
+from . import battery
+from .live import Moment
+
+
+@dataclass
+class Rig:
+    """
+    bones   of the armature, which know the skin of all meshes
+    world   float64 [4, 4], of the armature
+    moving  names of the bones that move vertices
+    """
+
+    armature: bpy.types.Object
+    bones: Bones
+    world: np.ndarray
+    moving: set[str] = field(default_factory=set)
+
+    @property
+    def is_moving(self) -> np.ndarray:
+        """bool [bones]"""
+        return np.array([name in self.moving for name in self.bones.names], bool)
+
+
+def rigs_of(now: Moment) -> list[Rig]:
+    found: dict[int, Rig] = {}
+    for part in now.subject.parts:
+        pairs = attach.replaced_modifiers(part.obj)
+        for skin, (_modifier, replaced) in zip(part.skin_stack.skins, pairs, strict=False):
+            if replaced.armature is None:
+                continue
+            bones, known = skin.deformer.bones, found.get(replaced.armature.session_uid)
+            if known is None:
+                world = np.array(replaced.armature.matrix_world)
+                known = found[replaced.armature.session_uid] = Rig(replaced.armature, bones, world)
+            else:
+                known.bones = known.bones.with_skin_of(bones)
+            known.moving.update(skin.deformer.moving_bones)
+    return list(found.values())
+
+
+def posed(now: Moment, poses: Mapping[tuple[str, ...], battery.Pose]) -> Moment:
+    """poses: by the names of a rig's bones; other rigs are at rest"""
+    return now.posed(
+        lambda bones: battery.posed(bones, poses[bones.names]) if bones.names in poses else bones.rest
+    )

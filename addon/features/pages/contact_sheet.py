@@ -1,0 +1,172 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""A contact sheet: the joints of a character bent alike under several variants, each joint with one camera.
+
+Shapes are computed and drawn beside Blender's evaluation: the file, its pose and its frame stay as they are.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+
+import bpy
+import numpy as np
+import sinew
+
+from ...attach import properties
+from ...base.errors import SinewError
+from ...skinning.variants import Variant
+from ..measure import live, motion_range
+from ..measure.joint_figures import Figures
+from ..measure.motion_range import Column
+from ..measure.rigs import Rig, posed, rigs_of
+from . import shaded
+from .views import View, joint_view
+
+# How far around a joint a picture shows, in mean lengths of the two limbs that meet there.
+REACH = 1.0
+# A joint that bends less of the surface than this share of all is not worth a column.
+LEAST_BENT = 2e-4
+
+
+@dataclass(frozen=True)
+class Cell:
+    """pixels: float32 [size, size, 4], RGBA in 0..1, from the bottom row up"""
+
+    row: int
+    column: int
+    pixels: np.ndarray
+    figures: Figures
+
+
+# Joints of limbs, which are seen without the rest of the body.
+OF_LIMBS = ("Elbow", "Wrist", "Knee", "Fingers")
+
+
+class Bent:
+    """One column: a joint of the character in its pose."""
+
+    def __init__(self, now: live.Moment, rig: Rig, column: Column) -> None:
+        self.joint, self.pose = column.joint, column.pose
+        self.moment = posed(now, {rig.bones.names: column.pose})
+        self._rig, self._bones = rig, column.bones
+
+    @property
+    def bent_share(self) -> float:
+        pose = self.moment.pose
+        return float(pose.bent_areas.sum()) / max(float(pose.rest.areas.sum()), 1e-30)
+
+    @cached_property
+    def view(self) -> View:
+        """A view for all variants."""
+        points = self.moment.measured_under([Variant.of("lbs")] * len(self.moment.inputs)).shape.points.T
+        bone, world = self._bones[0], self._rig.world[:3, :3]
+        motion = np.identity(4)
+        motion[:3, :3] = self.pose.rotations[bone]
+        axis = sinew.affine.to_screw(motion).axis
+        axis, limb = (_unit(world @ each) for each in (axis, self._rig.bones.limbs.vectors[bone]))
+        return joint_view(points, points[self._is_near()], axis, limb)
+
+    @cached_property
+    def shown(self) -> np.ndarray | None:
+        """bool [triangles], those that are drawn; None: all."""
+        if self.joint not in OF_LIMBS:
+            return None
+        bones = self._rig.bones.deforming_parents
+        taken = {int(bones[bone]) for bone in self._bones}.union(*map(self._carried, self._bones))
+        return self._follow(taken)[self.moment.subject.gauge.surface.triangles].any(axis=1)
+
+    @cached_property
+    def limbs(self) -> np.ndarray:
+        """bool [bones of the moment's frame]: those that meet at the joints."""
+        return self._columns(set().union(*map(self._around, self._bones)))
+
+    def _is_near(self) -> np.ndarray:
+        """bool [vertices]: those around the joints, of the limbs that meet there."""
+        bones, near = self._rig.bones, np.zeros(self.moment.subject.gauge.surface.vertex_count, bool)
+        rest, linear, place = self.moment.pose.rest.points, self._rig.world[:3, :3], self._rig.world[:3, 3]
+        for bone in self._bones:
+            head, above = bones.rest[bone, :3, 3], int(bones.deforming_parents[bone])
+            ways = np.stack([bones.limbs.vectors[bone], head - bones.rest[above, :3, 3]])
+            # A chain that bends as a whole is seen whole.
+            chain = bones.limbs.vectors[[each for each in self._bones if self._are_in_line(bone, each)]]
+            lengths = (float(np.linalg.norm(each @ linear.T, axis=1).sum()) for each in (ways, chain))
+            reach = REACH * max(lengths) / 2
+            distances = np.linalg.norm(rest - (linear @ head + place)[:, None], axis=0)
+            near |= (distances < reach) & self._follow(self._around(bone))
+        if near.any():
+            return near
+        return self.moment.pose.is_bent if self.moment.pose.is_bent.any() else np.ones_like(near)
+
+    def _are_in_line(self, bone: int, other: int) -> bool:
+        return other in self._carried(bone) or bone in self._carried(other)
+
+    def _around(self, bone: int) -> set[int]:
+        """The bone, what carries it, and what it carries directly."""
+        above = self._rig.bones.deforming_parents
+        return {bone, int(above[bone]), *map(int, np.flatnonzero(above == bone))}
+
+    def _follow(self, bones: set[int]) -> np.ndarray:
+        """bool [vertices]: those that follow some of the rig's bones most."""
+        heaviest = self.moment.pose.skin.limb_of_vertices
+        return (heaviest >= 0) & self._columns(bones)[heaviest]
+
+    def _columns(self, bones: set[int]) -> np.ndarray:
+        """bool [bones of the moment's frame]"""
+        found = []
+        for own in self.moment.inputs:
+            of_part = own.part.bound.first_deformer.bones
+            is_own = of_part.names == self._rig.bones.names
+            found.append(np.isin(of_part.owners, list(bones)) & is_own)
+        return np.concatenate(found)
+
+    def _carried(self, bone: int) -> set[int]:
+        found = {bone}
+        for other in self._rig.bones.from_the_root:
+            if int(self._rig.bones.deforming_parents[other]) in found:
+                found.add(other)
+        return found
+
+
+def columns(objects: Sequence[bpy.types.Object]) -> list[Bent]:
+    """Returns the joints that bend the character's surface, of the armatures of meshes that Sinew deforms.
+
+    Raises SinewError where there are none.
+    """
+    now = live.Moment.of(live.measure_now(objects, properties.BLENDER, "bend"))
+    found: list[Bent] = []
+    for rig in rigs_of(now):
+        own = [Bent(now, rig, column) for column in motion_range.columns(rig.bones, rig.is_moving)]
+        own = [each for each in own if each.bent_share >= LEAST_BENT]
+        if not all(each.joint in motion_range.COLUMNS.values() for each in own):
+            most = sorted(own, key=lambda each: -each.bent_share)[: motion_range.MOST_OTHERS]
+            own = [each for each in own if each in most]
+        found += own
+    if not found:
+        raise SinewError("No joint bends these meshes")
+    return found
+
+
+def cells(
+    joints: Sequence[Bent], rows: Sequence[Mapping[bpy.types.Object, Variant]], size: int
+) -> Iterator[Cell]:
+    """Draws row by row.
+
+    rows  by object, the variant that it has
+    size  pixels of a picture
+    """
+    for row, of_objects in enumerate(rows):
+        for column, bent in enumerate(joints):
+            variants = [of_objects[own.part.obj] for own in bent.moment.inputs]
+            measured = bent.moment.measured_under(variants)
+            figures = Figures.of(measured, bent.limbs)
+            if np.isfinite(measured.shape.points).all():
+                pixels = shaded.draw(measured.shape, bent.view, size, bent.shown)
+            else:
+                pixels = np.zeros((size, size, 4), np.float32)
+            yield Cell(row, column, pixels, figures)
+
+
+def _unit(vector: np.ndarray) -> np.ndarray:
+    return vector / max(float(np.linalg.norm(vector)), 1e-12)

@@ -1,0 +1,141 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Small shaded pictures of a shape, drawn without a graphics card."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...skinning.influences import items_of, owners_of
+from ...skinning.vectors import dots
+from ..measure.metrics import Shape
+from .views import View, camera_axes
+
+# Samples of a pixel, in each direction.
+SAMPLES = 2
+# How far outside of its triangle a sample may be, for rounding; as a share of it.
+EDGE = 1e-4
+# Over how many samples to each side normals are compared, and how much that lightens.
+WIDTH, CAVITY = 2, 0.5
+# sRGB; light comes from the upper left, behind the camera.
+FRONT, BACK = np.array([0.80, 0.76, 0.71], np.float32), np.array([0.55, 0.30, 0.24], np.float32)
+_LIGHT = (np.array([-0.45, 0.55, 0.70]) / np.linalg.norm([-0.45, 0.55, 0.70])).astype(np.float32)
+
+
+def draw(shape: Shape, view: View, size: int, shown: np.ndarray | None = None) -> np.ndarray:
+    """Returns float32 [size, size, 4], RGBA in 0..1, from the bottom row up; transparent where nothing is.
+
+    view   square
+    shown  bool [triangles]; None: all
+    """
+    across = size * SAMPLES
+    right, up = camera_axes(view.direction)
+    axes = np.stack([right, up, view.direction])
+    seen = axes @ (shape.points - view.target[:, None])
+    # In samples, with their middles at whole numbers.
+    seen[:2] = (seen[:2] / view.width + 0.5) * across - 0.5
+    corners = _corners_in(seen[:2], shape, across, shown)
+    samples, triangles, shares = _nearest(seen, corners, across)
+    lit = axes @ _vertex_normals(shape)
+    lit = (lit / np.maximum(np.sqrt(dots(lit, lit)), 1e-12)).astype(np.float32)
+    normals = np.einsum("kcn,cn->kn", lit[:, corners[:, triangles]], shares)
+    # What is seen from inside is another colour.
+    (ax, bx, cx), (ay, by, cy) = seen[:2, corners]
+    outwards = (bx - ax) * (cy - ay) > (cx - ax) * (by - ay)
+    faces = np.where(outwards[triangles], np.float32(1.0), np.float32(-1.0))
+    light = 0.35 + 0.65 * np.clip((_LIGHT @ normals) * faces, 0.0, 1.0)
+    light *= 1.0 + _cavity(normals * faces, samples, across)
+    picture = np.zeros((across * across, 4), np.float32)
+    picture[samples, :3] = light[:, None] * np.where(faces[:, None] > 0.0, FRONT, BACK)
+    picture[samples, 3] = 1.0
+    blocks = picture.reshape(size, SAMPLES, size, SAMPLES, 4).sum(axis=(1, 3))
+    colours = blocks[..., :3] / np.maximum(blocks[..., 3:], 1.0)
+    return np.concatenate([colours, blocks[..., 3:] / SAMPLES**2], axis=2).clip(0.0, 1.0)
+
+
+def _vertex_normals(shape: Shape) -> np.ndarray:
+    """float64 [3, vertices], of any length."""
+    count, corners = shape.surface.vertex_count, shape.surface.corners
+    return np.stack([sum(np.bincount(corner, axis, count) for corner in corners) for axis in shape.normals])
+
+
+def _corners_in(places: np.ndarray, shape: Shape, across: int, shown: np.ndarray | None) -> np.ndarray:
+    """int64 [3, n]: the corners of triangles that are in the picture, and are no lines there."""
+    corners = shape.surface.corners if shown is None else shape.surface.corners[:, shown]
+    points = places[:, corners]
+    low, high = points.min(axis=1), points.max(axis=1)
+    is_in = ((high >= 0.0) & (low <= across - 1)).all(axis=0)
+    (ax, bx, cx), (ay, by, cy) = points
+    return corners[:, is_in & (np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) > 1e-9)]
+
+
+def _nearest(seen: np.ndarray, corners: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the samples that are covered, and of each the nearest triangle with the shares of its corners
+    [3, n].
+
+    seen  float64 [3, vertices]: places in samples, and heights towards the camera
+    """
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz) = seen[:, corners]
+    # From behind to the front: then most samples are right at once.
+    order = np.argsort(az + bz + cz)
+    ax, bx, cx, ay, by, cy, az, bz, cz = (each[order] for each in (ax, bx, cx, ay, by, cy, az, bz, cz))
+    whole = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+    second = (cy - ay) / whole, (ax - cx) / whole
+    third = (ay - by) / whole, (bx - ax) / whole
+    low = [
+        np.ceil(np.minimum(np.minimum(*p[:2]), p[2])).clip(0, across - 1)
+        for p in ((ax, bx, cx), (ay, by, cy))
+    ]
+    high = [
+        np.floor(np.maximum(np.maximum(*p[:2]), p[2])).clip(0, across - 1)
+        for p in ((ax, bx, cx), (ay, by, cy))
+    ]
+    wide, tall = (np.maximum(b - a + 1, 0).astype(np.int64) for a, b in zip(low, high, strict=True))
+    counts = wide * tall
+    owner, number = owners_of(counts), items_of(np.zeros_like(counts), counts)
+    row = number // np.maximum(wide, 1)[owner]
+    column = number - row * wide[owner]
+    # Relative to a corner of the box, where single precision is enough.
+    x0, y0 = low[0] - ax, low[1] - ay
+    b0, c0 = second[0] * x0 + second[1] * y0, third[0] * x0 + third[1] * y0
+    rows = np.stack([b0, *second, c0, *third]).astype(np.float32)
+    b, bx_, by_, c, cx_, cy_ = rows[:, owner]
+    b += bx_ * column
+    b += by_ * row
+    c += cx_ * column
+    c += cy_ * row
+    is_in = (b >= -EDGE) & (c >= -EDGE) & (b + c <= 1.0 + EDGE)
+    owner, b, c = owner[is_in], b[is_in], c[is_in]
+    samples = (
+        (low[1].astype(np.int64)[owner] + row[is_in]) * across
+        + low[0].astype(np.int64)[owner]
+        + column[is_in]
+    )
+    height = (az[owner] + b * (bz - az)[owner] + c * (cz - az)[owner]).astype(np.float32)
+    found = np.full(across * across, -1)
+    left = np.arange(len(samples))
+    while len(left):
+        # The last of equal samples stays.
+        found[samples[left]] = left
+        left = left[height[left] > height[found[samples[left]]]]
+    covered = np.flatnonzero(found >= 0)
+    taken = found[covered]
+    b, c = b[taken], c[taken]
+    return covered, order[owner[taken]], np.stack([1.0 - b - c, b, c])
+
+
+def _cavity(normals: np.ndarray, samples: np.ndarray, across: int) -> np.ndarray:
+    """float32 [n]: how much lighter each sample is on a ridge, and darker in a valley, by how the normals
+    [3, n] differ across it on the screen."""
+    whole = np.zeros((2, across * across), np.float32)
+    whole[:, samples] = normals[:2]
+    x, y = whole.reshape(2, across, across)
+    bent = np.zeros((across, across), np.float32)
+    bent[:, WIDTH:-WIDTH] += x[:, 2 * WIDTH :] - x[:, : -2 * WIDTH]
+    bent[WIDTH:-WIDTH] += y[2 * WIDTH :] - y[: -2 * WIDTH]
+    covered = np.zeros(across * across, bool)
+    covered[samples] = True
+    inside = covered.reshape(across, across).copy()
+    for step in (WIDTH, -WIDTH):
+        for axis in (0, 1):
+            inside &= np.roll(covered.reshape(across, across), step, axis)
+    return np.clip(CAVITY * np.where(inside, bent, 0.0).ravel()[samples], -0.5, 0.15)
