@@ -49,10 +49,12 @@ def test_a_surface_that_is_far_from_the_origin():
     u, v = np.meshgrid(np.arange(side), np.arange(side), indexing="ij")
     sheet = np.stack([u.ravel(), v.ravel(), 0 * u.ravel()], 1) / side
     corner = (u[:-1, :-1] * side + v[:-1, :-1]).ravel()
-    faces = np.concatenate([
-        np.stack([corner, corner + side, corner + 1], 1),
-        np.stack([corner + side, corner + side + 1, corner + 1], 1),
-    ])
+    faces = np.concatenate(
+        [
+            np.stack([corner, corner + side, corner + 1], 1),
+            np.stack([corner + side, corner + side + 1, corner + 1], 1),
+        ]
+    )
     upright = sheet[:, [0, 2, 1]] + (0.0, 0.512, -0.487)
     points = np.concatenate([sheet, upright]) + 1e6
     triangles = np.concatenate([faces, faces + len(sheet)]).astype(np.int32)
