@@ -24,7 +24,7 @@ from ..bake import bake_apart, bake_bones
 from ..bake.bake_export import TEXTURES_STAY
 from ..bake.baked_files import is_whole
 from ..bake.segment_bones import SegmentReport
-from . import export, verify
+from . import engine_weights, export, verify
 from .export_check import FRAMES, Check, ExportOptions, spread_frames
 
 # What the add-on for VRM writes of a vertex.
@@ -71,6 +71,7 @@ def write(
     bendy, segments, left_out = bake_bones.replace_bendy_bones(
         skinned if kind != ".vrm" else [], whole, influences
     )
+    left_out += engine_weights.prepare(skinned, kind)
     rigs = {properties.of(obj).armature.name for obj in skinned}
     if is_gltf:
         scene.sinew_gltf.skinning = True

@@ -68,6 +68,31 @@ def skip_without_reader(ending):
         pytest.importorskip("ufbx")
 
 
+def add_control(rig):
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = rig.data.edit_bones.new("control")
+    bone.tail, bone.use_deform = (0.0, 0.0, 1.0), False
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+@pytest.mark.parametrize("is_in_a_group", [False, True], ids=["none", "of_control"])
+def test_vertices_that_no_bone_moves(scene, tmp_path, ending, is_in_a_group):
+    """In no group, or in that of a bone which does not deform and moves."""
+    skip_without_reader(ending)
+    obj, rig = scene
+    for group in obj.vertex_groups:
+        group.remove([100, 101, 150])
+    if is_in_a_group:
+        add_control(rig)
+        scenes.key(rig.pose.bones["control"], "location", ((1, (0, 0, 0)), (11, (0.0, 0.0, 2.0))))
+        obj.vertex_groups.new(name="control").add([100, 101, 20], 0.5, "REPLACE")
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == set()
+    assert mesh["total"]["largest"] <= 1e-6 * mesh["diagonal"]
+
+
 def plant(cause, obj, rig):
     """Returns options of the command."""
     if cause == "method":
