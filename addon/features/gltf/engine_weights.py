@@ -33,8 +33,8 @@ def prepare(meshes: Sequence[bpy.types.Object], kind: str) -> list[str]:
             rows, unmoved = _rows(obj, rig, kind in (".usdc", ".fbx"))
             if rows and (reason := _reason(obj, rig)):
                 left_out.append(
-                    f"{obj.name}: the file moves {len(rows)} vertices otherwise, as weights of bones that deform "
-                    f"are missing: {reason}"
+                    f"{obj.name}: the file moves {len(rows)} vertices otherwise, as they have no weights of "
+                    f"bones that deform: {reason}"
                 )
             elif rows:
                 found.append((obj, rig, rows, unmoved))

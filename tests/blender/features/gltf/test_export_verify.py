@@ -295,6 +295,22 @@ def test_half_floats_of_usd(empty_file, tmp_path):
     assert mesh["explained"]
 
 
+@pytest.mark.parametrize("scales", [(1.0, 1.008), (0.02, 0.029), (1.0, 1.1)])
+def test_slow_scales_of_usd(scene, tmp_path, scales):
+    """Exact but for half floats, 2**-12 of a number at most; before 4.4 a sentence says what is lost."""
+    _obj, rig = scene
+    scenes.key(rig.pose.bones[1], "scale", [(1, (scales[0],) * 3), (100, (scales[1],) * 3)])
+    bpy.context.scene.frame_end = 100
+    if bpy.app.version >= (4, 4, 0):
+        mesh = exported(tmp_path, ending=".usdc")
+        assert found_causes(mesh) == {"shear_scale"}
+        assert mesh["total"]["largest"] < 2**-11 * scales[1] * mesh["diagonal"]
+    else:
+        scenes.save(tmp_path / "arm.blend")
+        words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out", tmp_path / "arm.usdc")
+        assert "bones' scales are up to 0.0" in run_sinew(*words, status=1).stderr
+
+
 def test_between_frames(scene, tmp_path):
     """The distance in the middle between frames is that of Blender's shape from the file's."""
     obj, rig = scene
