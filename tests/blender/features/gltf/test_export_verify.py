@@ -332,6 +332,15 @@ def test_the_limit_of_the_user(scene, tmp_path):
     exported(tmp_path, "--at-most", "0.1", method="dq", status=1)
 
 
+def test_more_than_four_influences(scene, tmp_path):
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out")
+    said = run_sinew(*words, tmp_path / "a.glb", "--influences", "8").stderr
+    assert "Blender, Godot play more than four influences; F3D, panda3d, " in said
+    assert "more than four" not in run_sinew(*words, tmp_path / "b.glb").stderr
+    assert "more than four" not in run_sinew(*words, tmp_path / "c.usdc", "--influences", "8").stderr
+
+
 def test_sentences(scene, tmp_path):
     file, out = tmp_path / "arm.blend", tmp_path / "a.glb"
     scenes.save(file)
