@@ -129,6 +129,33 @@ def test_each_cause_alone(scene, tmp_path, cause):
     assert np.isclose(mesh["causes"][cause]["mean"], mesh["total"]["mean"], rtol=1e-3)
 
 
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+@pytest.mark.parametrize("mode", ["NONE", "FULL"])
+def test_unequal_scale(scene, tmp_path, ending, mode):
+    """The bone below is named, unless its Inherit Scale is Full, which is exact."""
+    skip_without_reader(ending)
+    _obj, rig = scene
+    rig.data.bones[2].inherit_scale = mode
+    scenes.key(rig.pose.bones[1], "scale", ((1, (1.0, 1.75, 0.5)), (11, (1.0, 1.75, 0.5))))
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == (set() if mode == "FULL" else {"shear_scale"})
+    assert mesh["explained"]
+    assert mesh["names"].get("shear_scale") == (None if mode == "FULL" else "bone.2")
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+def test_a_mesh_that_is_not_the_armatures_child(scene, tmp_path, ending):
+    """As the armature object moves, the mesh stays in Blender, and moves in the file."""
+    skip_without_reader(ending)
+    obj, rig = scene
+    obj.parent = None
+    scenes.key(rig, "location", ((1, (0, 0, 0)), (11, (0, 0, 3))))
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == {"transforms"}
+    assert mesh["names"]["transforms"] == "Arm Rig"
+    assert np.isclose(mesh["causes"]["transforms"]["largest"], mesh["total"]["largest"], rtol=1e-3)
+
+
 @pytest.mark.parametrize("ending", [".glb", ".fbx"])
 def test_what_moves_is_read_where_the_exporter_reads_it(scene, tmp_path, ending):
     """glTF's exporter is at frame 0; FBX has the action for each armature that could play it."""
