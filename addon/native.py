@@ -22,7 +22,7 @@ NAMES = (
         "interpolate",
     ),
     *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages", "thread_id"),
-    "weights_in_memory",
+    *("crossing_triangles", "weights_in_memory"),
 )
 
 

@@ -15,8 +15,10 @@ from ..io import mesh_io
 # group gets the points.
 MARK = "sinew_node_group"
 ATTRIBUTE, POINT_BUFFER = 13, 14
+# What the names of Sinew's attributes start with.
+OWN = ".sinew_"
 # The group that marks a mesh, and the attribute that it adds. The heat map's has 15.
-STACK_MARK, IN_STACK = 16, ".sinew_in_stack"
+STACK_MARK, IN_STACK = 16, f"{OWN}in_stack"
 # Added to the value where the group gives normals of this domain.
 _WITH_NORMALS = {"": 0, "POINT": 30, "CORNER": 40}
 # The input with the name of the normals attribute.
@@ -303,12 +305,17 @@ def _switch(group: bpy.types.NodeTree, which: _Source | bool, off: _Source, on: 
     return add(group, "GeometryNodeSwitch", inputs, input_type="GEOMETRY")
 
 
-def _without(group: bpy.types.NodeTree, geometry: _Source, attribute: _Source | str) -> bpy.types.Node:
-    return add(group, "GeometryNodeRemoveAttribute", {"Geometry": geometry, "Name": attribute})
-
-
-def _without_marks(group: bpy.types.NodeTree, geometry: _Source, source: bpy.types.Node) -> bpy.types.Node:
-    return _without(group, _without(group, geometry, source.outputs[MARK_TO_REMOVE]), IN_STACK)
+def _without_own(group: bpy.types.NodeTree, geometry: _Source, source: bpy.types.Node) -> bpy.types.Node:
+    """Returns the geometry without what Sinew added: a subdivision behind would interpolate it for each of
+    its vertices, and exports would contain it. One node for all of Sinew's names, as each takes its time."""
+    kind, rest = "GeometryNodeRemoveAttribute", source.outputs[MARK_TO_REMOVE]
+    own = add(group, kind, {"Geometry": add(group, kind, {"Geometry": geometry, "Name": rest})})
+    if hasattr(own, "pattern_mode"):
+        own.pattern_mode = "WILDCARD"
+    else:  # Blender 5.3 made it an input
+        own.inputs["Pattern Mode"].default_value = "Wildcard"
+    own.inputs["Name"].default_value = f"{OWN}*"
+    return own
 
 
 def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
@@ -339,14 +346,12 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
         },
         data_type="FLOAT_VECTOR",
     )
-    # Removed, as a subdivision behind would interpolate it for each of its vertices, and exports would
-    # contain it.
-    moved = _without_marks(group, _without(group, place, given["Points"]), source)
+    moved = place
     if normals:
         named = named_attribute(group, given[NORMALS])
         first = sample(group, moved, named, 0, normals)
-        moved = _without(group, _with_normals(group, source, moved, named, first, normals), given[NORMALS])
-    add(group, "NodeGroupOutput", {"Geometry": moved})
+        moved = _with_normals(group, source, moved, named, first, normals)
+    add(group, "NodeGroupOutput", {"Geometry": _without_own(group, moved, source)})
     return group
 
 
@@ -410,7 +415,7 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
             "Position": sample(group, buffer, stored, index),
         },
     )
-    moved = _without_marks(group, place, source)
+    moved = _without_own(group, place, source)
     if normals:
         # They are those of the buffer's vertices behind the points.
         size = add(group, "GeometryNodeAttributeDomainSize", {"Geometry": moved}, component="MESH")

@@ -24,8 +24,7 @@ from . import (
 )
 from .subscribers import notify, subscribers
 
-ATTRIBUTE, NORMALS_ATTRIBUTE = ".sinew_points", ".sinew_normals"
-_OWN_ATTRIBUTES = (ATTRIBUTE, NORMALS_ATTRIBUTE, node_group.IN_STACK)
+ATTRIBUTE, NORMALS_ATTRIBUTE = f"{node_group.OWN}points", f"{node_group.OWN}normals"
 
 
 def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders: bool = True) -> None:
@@ -227,7 +226,7 @@ def remove_attributes(obj: bpy.types.Object) -> None:
     """Removes all of Sinew's attributes from the mesh: one that was copied can have several."""
     mesh, storage = obj.data, properties.of(obj).storage
     for name in [each.name for each in mesh.attributes] if mesh.is_editable else ():
-        if name.startswith(_OWN_ATTRIBUTES):
+        if name.startswith(node_group.OWN):
             mesh_io.remove_attribute(mesh, name)
     if storage.attribute:
         storage.attribute = ""

@@ -12,7 +12,7 @@ _DEVICE = re.compile(
     r"(CON|PRN|AUX|NUL|CONIN\$|CONOUT\$|(COM|LPT)[0-9\u00b9\u00b2\u00b3]) *(\.|$)", re.IGNORECASE
 )
 # Then an underscore, and the bone that they follow.
-MADE_BONES = HELPER, CENTRE, SEGMENT = "Helper", "Centre", "Segment"
+MADE_BONES = HELPER, CENTRE, SEGMENT, NEUTRAL = "Helper", "Centre", "Segment", "Neutral"
 
 
 def fits(name: str, pattern: str) -> bool:

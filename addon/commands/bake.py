@@ -11,7 +11,7 @@ from typing import Any
 from ..base import interrupt
 from ..base.errors import SinewError, WrongUse, about
 from ..base.options import read_options
-from ..features.bake.baked_files import FILES, KINDS
+from ..features.bake.baked_files import FILES, FORMATS, KINDS, played_elsewhere
 from ..features.bake.helper_bones import HelperOptions, Report
 from ..features.bake.vat import VatOptions
 from ..jobs.inputs import Job, plan_jobs
@@ -144,6 +144,8 @@ def _bake(outcome: Baked, args: argparse.Namespace, console: Console) -> None:
             started.publish()
         else:
             files.save_copy(source, target, started.publish)
+    if args.to in FORMATS:
+        console.note_on(target, [played_elsewhere(args.to, chosen)])
     outcome.meshes, outcome.frames = len(taken), len(chosen)
     if isinstance(started, bake_bones.BoneBake):
         outcome.bones, outcome.unit = started.reports, characters.length_unit(scene)

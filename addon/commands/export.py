@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 
 from ..base.errors import SinewError, WrongUse
 from ..base.options import read_options
+from ..features.gltf import players
 from ..features.gltf.export_check import ENDINGS, FRAMES, Check, ExportOptions
 from .arguments import add_file, add_frames, add_json, add_method, add_options, add_set, file_named, percent
 from .console import Console
@@ -57,6 +58,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     console.note_on(args.file, files.open_file(args.file))
     meshes = attach.deformed_meshes(list(bpy.context.scene.objects))
     options = read_options(ExportOptions, args, frames=args.frames)
+    if args.out.suffix.lower() == ".glb" and options.influences > players.FOUR:
+        console.note(f"{args.out}: {players.more_than_four()}")
     # Blender does not evaluate hidden objects.
     with characters.shown(meshes):
         left_out, skinned = _skinned(args, meshes, console)

@@ -118,15 +118,12 @@ def read(
     bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     groups = stage_settings.vertex_groups(properties.of(obj))
     if old is not None:
-        read_now.keep_normals_of(old.source)
+        read_now.take_what_equals(old.source)
     spaces_now = [_bones_from_model(obj, replaced.armature, depsgraph) for _modifier, replaced in pairs]
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones, spaces_now):
         if not read_now.has_same_surface(old.source):
             for skin in old.skin_stack.skins:
                 skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
-        if np.array_equal(read_now.points, old.source.points):
-            # An identical array signals that nothing moved.
-            read_now.points = old.source.points
         old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skins))
         return replace(old, source=read_now)
     options = _options_of(obj, now, depsgraph)
@@ -214,7 +211,7 @@ def _equals_but_for_points(
 ) -> bool:
     known = [skin.deformer.weighting for skin in old.skin_stack.skins]
     # Where a bone is the mesh's parent, poses move its space: the one in which it was bound decides.
-    has_same_skin = np.array_equal(read_now.surface_points, old.source.surface_points)
+    has_same_skin = are_equal(read_now.surface_points, old.source.surface_points)
     return read_now.equals_but_for_points(old.source) and all(
         now.equals(before.bones) and (has_same_skin or _has_same_limbs(before, read_now, space))
         for now, before, space in zip(bones, known, spaces_now, strict=False)

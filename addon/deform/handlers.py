@@ -16,7 +16,7 @@ from ..attach.updates import (
     phase,
     updates_suspended,
 )
-from . import events, session
+from . import events, rigid_bodies, session
 from .changes import Changes, Find, finder, names_of_changed_meshes
 from .session import current
 
@@ -85,6 +85,8 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
             original = finder("frame_change_post", on_frame_change)
             if not session.were_all_deformed(depsgraph, original):
                 waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
+        if depsgraph.scene.rigidbody_world is not None and may_react and may_change_file():
+            rigid_bodies.make_again(depsgraph.scene, (obj for obj, _state in current.pairs))
     _end_event(depsgraph, waiting)
     _note_seen("frame_change_post", depsgraph)
 

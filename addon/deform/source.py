@@ -83,7 +83,7 @@ class Source:
             has_same_keys
             and self.has_same_surface(other)
             and self.has_same_shading(other)
-            and np.array_equal(self.points, other.points)
+            and are_equal(self.points, other.points)
         )
 
     def has_same_shading(self, other: Source) -> bool:
@@ -114,6 +114,18 @@ class Source:
             return 0
         return len(self.points if domain == "POINT" else self.topology.corner_vertices)
 
+    def take_what_equals(self, other: Source) -> None:
+        """Takes over the other's arrays that equal these. So later comparisons cost nothing, and an identical
+        array signals that nothing moved."""
+        for name in ("points", "mesh_points", "triangles", "sdef_keys"):
+            if are_equal(getattr(self, name), getattr(other, name)):
+                setattr(self, name, getattr(other, name))
+        for name in ("weights", "topology", "shading", "shape_keys"):
+            mine, its = getattr(self, name), getattr(other, name)
+            if mine is not None and its is not None and mine.equals(its):
+                setattr(self, name, its)
+        self.keep_normals_of(other)
+
     def keep_normals_of(self, other: Source) -> None:
         """Takes over the prepared normals of the other, where these are the same."""
         made = other.__dict__.get("normals")
@@ -126,9 +138,9 @@ class Source:
     def has_same_surface(self, other: Source) -> bool:
         """Whether everything that methods compute vertex data from, except weights, is the same. It is where
         upstream only moves points."""
-        return np.array_equal(self.mesh_points, other.mesh_points) and all(
-            are_equal(mine, its)
-            for mine, its in ((self.triangles, other.triangles), (self.sdef_keys, other.sdef_keys))
+        return all(
+            are_equal(getattr(self, name), getattr(other, name))
+            for name in ("mesh_points", "triangles", "sdef_keys")
         )
 
 

@@ -19,7 +19,7 @@ class OfArrays:
 
     def equals(self, other: Self) -> bool:
         pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self) if f.compare)
-        return all(
+        return self is other or all(
             a.equals(b) if isinstance(a, OfArrays) else a == b if isinstance(a, tuple) else are_equal(a, b)
             for a, b in pairs
         )

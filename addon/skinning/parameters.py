@@ -16,7 +16,7 @@ OFF = "off"
 """The value "none" of a parameter that names a method."""
 
 PRESETS = {
-    "recommended": "Method, Twist Spread, Limit Bulge and, where weights are crude, Delta Mush: measured on "
+    "recommended": "Method, Twist Spread, Limit Bulge and Delta Mush, each where it helps: measured on "
     "the character, in the frames in which its joints bend most, or without an action in a battery of poses"
 }
 """What chooses a method and stages, by its name."""

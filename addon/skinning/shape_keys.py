@@ -24,9 +24,11 @@ class ShapeKeys:
     deltas: Sequence[np.ndarray | None]
 
     def equals(self, other: Self) -> bool:
-        if self.names != other.names or not np.array_equal(self.basis, other.basis):
-            return False
-        return all(are_equal(a, b) for a, b in zip(self.deltas, other.deltas, strict=True))
+        return self is other or (
+            self.names == other.names
+            and np.array_equal(self.basis, other.basis)
+            and all(are_equal(a, b) for a, b in zip(self.deltas, other.deltas, strict=True))
+        )
 
     def mix(self, values: np.ndarray) -> np.ndarray:
         """float32 [vertices, 3] with each key at its value; a muted key's value is 0."""

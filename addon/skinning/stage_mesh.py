@@ -8,7 +8,7 @@ from typing import Self
 import numpy as np
 import sinew
 
-from .arrays import OfArrays
+from .arrays import OfArrays, are_equal
 from .rig import Weighting
 from .vectors import transformed
 
@@ -65,7 +65,4 @@ class StageMesh:
 
     def equals(self, other: Self) -> bool:
         """Whether both have the same points and faces; both belong to the same Armature modifiers."""
-        points, known = self.rest_points, other.rest_points
-        if points is None or known is None:
-            return points is known and self.topology.equals(other.topology)
-        return np.array_equal(points, known) and self.topology.equals(other.topology)
+        return are_equal(self.rest_points, other.rest_points) and self.topology.equals(other.topology)

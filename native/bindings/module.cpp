@@ -8,7 +8,7 @@ namespace sinew::bindings {
 // return them.
 #define SINEW_BINDINGS(bind)                                                                         \
     bind(compiled_in) bind(methods) bind(skeleton) bind(transforms) bind(interpolate) bind(deformer) \
-        bind(normals) bind(skinned_normals) bind(precompute) bind(threads) bind(weights)
+        bind(normals) bind(skinned_normals) bind(precompute) bind(threads) bind(weights) bind(crossings)
 
 #define SINEW_DECLARE(name) void bind_##name(py::module_& m);
 SINEW_BINDINGS(SINEW_DECLARE)

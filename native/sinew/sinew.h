@@ -15,6 +15,7 @@
 #include "sinew/deformer.h"
 #include "sinew/interpolate/methods.h"
 #include "sinew/interpolate/spline.h"
+#include "sinew/mesh/crossings.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
 #include "sinew/methods/methods.h"
 #include "sinew/normals.h"

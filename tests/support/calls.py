@@ -100,6 +100,10 @@ CALLS = {
         {"rest_points": SHEET},
     ),
     "mush": (lambda **given: sinew.DeltaMush(SHEET, **FACES).apply(**given), {"points": SHEET}),
+    "crossing_triangles": (
+        sinew.crossing_triangles,
+        {"points": SHEET.astype(np.float64), "triangles": np.int32([[0, 1, 2], [0, 2, 3]])},
+    ),
     "Normals": (
         lambda vertex_count, **given: sinew.Normals(vertex_count, **given).compute(SHEET[:vertex_count]),
         {"vertex_count": 4, **FACES},
@@ -167,6 +171,7 @@ MORE = {
         "sharp_faces": [1, 0],
         "custom_normals": np.ones((6, 2), np.int16),
     },
+    "crossing_triangles": {"threads": 2},
     "compute": {"domain": "vertex", "out": np.zeros((4, 3), np.float32), "threads": 2},
     "SkinnedNormals": {"tangents": POINTS, "vertices": [1, 0], "method": "dq", "mix": ("lbs", HALF)},
     "deform_skinned": OF_POSE,

@@ -8,6 +8,7 @@ PUBLIC = (
     "bake_apart",
     "bake_bones",
     "bake_export",
+    "bake_state",
     "helper_bones",
     "helper_bones_io",
     "segment_bones",

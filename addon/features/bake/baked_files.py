@@ -41,6 +41,23 @@ FORMATS: dict[str, tuple[Callable[[Sequence[float], int, float], bytes], str]] =
 }
 
 
+def played_elsewhere(kind: str, frames: Sequence[float]) -> str:
+    """How a Mesh Cache modifier plays the file where Sinew did not add it: by default it takes no notice of
+    times, start and rate, and has sample n at frame n."""
+    if kind == "mdd":
+        return "elsewhere, set Mesh Cache's Time Mode to Time, as it otherwise has sample n at frame n"
+    if not is_even(frames):
+        return (
+            "elsewhere, key Mesh Cache's Evaluation Frame, as .pc2 has no frames that are unequally far apart"
+        )
+    step = frames[1] - frames[0] if len(frames) > 1 else 1.0
+    scale = f" and Frame Scale to {1.0 / step:g}" if step != 1.0 else ""
+    return (
+        f"elsewhere, set Mesh Cache's Start Frame to {frames[0] / step:g}{scale}, as it otherwise has "
+        "sample n at frame n"
+    )
+
+
 class PointCache:
     """A point cache that is written frame by frame to a temporary file; publish() renames it to `path`.
 

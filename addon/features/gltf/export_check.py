@@ -38,6 +38,11 @@ CAUSES: dict[str, str] = {
     "actions": "other actions, whose values the exporter keeps where this one has no keys",
     "rest": "no cause that is known",
 }
+# Where names are known: of bones, of the armature object.
+NAMED = {
+    "shear_scale": "bones that are sheared, which the file has exactly with Inherit Scale Full: {names}",
+    "transforms": "its object moves apart from {names}; parent it to that, without keys of its own",
+}
 NORMALS = "normals, which engines skin as they were at rest"
 
 # The files that can be written and verified, and how many frames are, unless they are chosen.
@@ -96,6 +101,7 @@ class Seen:
     has_keys       it has shape keys
     corners        int [corners], the vertex of each corner of its faces
     normals        float32 [corners, 3], at rest, object space
+    names          of what causes it, for those of NAMED
     """
 
     name: str
@@ -108,6 +114,7 @@ class Seen:
     normals: np.ndarray
     frames: list[SeenFrame] = field(default_factory=list)
     between: list[SeenFrame] = field(default_factory=list)
+    names: dict[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -131,6 +138,7 @@ class Check:
     total     between the file and what was seen
     causes    of each of CAUSES alone
     normals   between skinned normals and those seen, in degrees; None where they were not compared
+    names     of Seen
     """
 
     mesh: str
@@ -139,6 +147,7 @@ class Check:
     total: Distance
     causes: dict[str, Distance]
     normals: Distance | None = None
+    names: dict[str, str] = field(default_factory=dict)
 
     @property
     def is_explained(self) -> bool:
@@ -169,17 +178,20 @@ class Check:
                 share=f"{100.0 * self.share:.2g}",
             ),
             *(
-                self._caused(distance, unit, CAUSES[name])
+                self._caused(distance, unit, self._cause(name))
                 for name, distance in self.causes.items()
                 if distance.largest > self.rounding
             ),
         ]
         if self.normals is not None and self.normals.largest > _SMALL_ANGLE:
-            said.append(self._caused(self.normals, "degrees", NORMALS))
+            said.append(self._caused(self.normals, "degrees", phrase(NORMALS)))
         return said
 
-    def _caused(self, distance: Distance, unit: str, cause: str) -> Phrase:
-        return phrase("{distance}: {cause}", distance=self._said(distance, unit), cause=phrase(cause))
+    def _cause(self, name: str) -> Phrase:
+        return phrase(NAMED[name], names=self.names[name]) if name in self.names else phrase(CAUSES[name])
+
+    def _caused(self, distance: Distance, unit: str, cause: Phrase) -> Phrase:
+        return phrase("{distance}: {cause}", distance=self._said(distance, unit), cause=cause)
 
     @staticmethod
     def _said(distance: Distance, unit: str) -> Phrase:
@@ -281,16 +293,17 @@ class Comparison:
             damaged, expected = self._damaged(each, motions), self._expected(each)
             constant = blended(*self._constant, each.motions, rest)
             played = self.played(each)
+            bound = blended(*own, each.bound, rest)
             pairs["total"].append((played, each.seen[at]))
             pairs["modifiers"].append((each.seen[at], each.shown[at]))
             pairs["method"].append((each.shown[at], linear))
-            pairs["pose"].append((blended(*own, expected, rest), blended(*own, each.bound, rest)))
+            pairs["pose"].append((blended(*own, expected, rest), bound))
             pairs["bendy"].append((constant, linear))
             pairs["influences"].append((blended(*cut, each.motions, rest), constant))
             pairs["shape_keys"].append((blended(*own, each.motions, points), linear))
-            of_damaged = np.where(damaged, motions, each.motions)
-            pairs["shear_scale"].append((blended(*own, of_damaged, rest), linear))
-            pairs["transforms"].append((blended(*own, each.bound, rest), linear))
+            of_damaged = np.where(damaged, motions, each.bound)
+            pairs["shear_scale"].append((blended(*own, of_damaged, rest), bound))
+            pairs["transforms"].append((bound, linear))
             pairs["rest"].append((blended(*cut, np.where(damaged, motions, expected), points), played))
         for each in seen.between if self._played.is_animated else ():
             own, rest = self._rows(each.influences), each.rest[at]
@@ -302,7 +315,7 @@ class Comparison:
         points = seen.frames[0].seen
         diagonal = float(np.linalg.norm(np.ptp(points, axis=0))) if len(points) else 0.0
         rounding = EXPLAINED * max(diagonal, 0.1 * float(np.abs(points).max(initial=0.0)))
-        return Check(seen.name, diagonal, rounding, found.pop("total"), found, self._angles())
+        return Check(seen.name, diagonal, rounding, found.pop("total"), found, self._angles(), seen.names)
 
     def _angles(self) -> Distance | None:
         """Between the normals that an engine skins, without the inverse of scale, and those seen."""
@@ -340,6 +353,21 @@ class Comparison:
         return np.where(best > _SAME_NORMAL, found, -1)
 
 
+def shears(poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """float [bones]: the largest cosine between two axes of each, relative to its parent. As of
+    damaged_bones()."""
+    axes = _axes(poses, parents)
+    sizes = np.linalg.norm(axes, axis=1)
+    products = axes.transpose(0, 2, 1) @ axes / np.maximum(sizes[:, :, None] * sizes[:, None], 1e-30)
+    return np.abs(products * (1.0 - np.identity(3))).max(axis=(1, 2), initial=0.0)
+
+
+def _axes(poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """float64 [bones, 3, 3], relative to their parents."""
+    above = np.where(parents[:, None, None] >= 0, poses[parents], np.identity(4))
+    return (np.linalg.pinv(above) @ poses)[:, :3, :3]
+
+
 def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:
     """float [bones]: how far their axes in the file may be from those seen, as a part of their length: above
     0 for those that location, rotation and scale relative to their parents, as a file stores them, do not
@@ -349,13 +377,9 @@ def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarr
     parents  int [bones], -1 for none
     kind     the ending of the file
     """
-    above = np.where(parents[:, None, None] >= 0, poses[parents], np.identity(4))
-    axes = (np.linalg.pinv(above) @ poses)[:, :3, :3]
-    products = axes.transpose(0, 2, 1) @ axes
-    sizes = np.sqrt(np.einsum("nii->ni", products))
-    scale = np.maximum(sizes[:, :, None] * sizes[:, None], 1e-30)
-    sheared = (np.abs(products / scale * (1.0 - np.identity(3))) > 1e-5).any(axis=(1, 2))
-    sheared |= (sizes < 1e-6).any(axis=1)
+    axes = _axes(poses, parents)
+    sizes = np.linalg.norm(axes, axis=1)
+    sheared = (shears(poses, parents) > 1e-5) | (sizes < 1e-6).any(axis=1)
     rounded = np.zeros(len(poses), dtype=bool)
     if kind == ".usdc":
         # Scales are half floats.

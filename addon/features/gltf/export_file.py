@@ -8,7 +8,7 @@ import errno
 import io
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, redirect_stderr
+from contextlib import contextmanager, nullcontext, redirect_stderr
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
@@ -24,7 +24,7 @@ from ..bake import bake_apart, bake_bones
 from ..bake.bake_export import TEXTURES_STAY
 from ..bake.baked_files import is_whole
 from ..bake.segment_bones import SegmentReport
-from . import export, verify
+from . import engine_weights, export, usd_scales, verify
 from .export_check import FRAMES, Check, ExportOptions, spread_frames
 
 # What the add-on for VRM writes of a vertex.
@@ -71,6 +71,7 @@ def write(
     bendy, segments, left_out = bake_bones.replace_bendy_bones(
         skinned if kind != ".vrm" else [], whole, influences
     )
+    left_out += engine_weights.prepare(skinned, kind)
     rigs = {properties.of(obj).armature.name for obj in skinned}
     if is_gltf:
         scene.sinew_gltf.skinning = True
@@ -85,7 +86,7 @@ def write(
                 if recording is not None and kind == ".fbx":
                     # Before the other actions leave values behind.
                     _fbx(str(alone), 0, bake_anim_use_all_actions=False, bake_anim_use_nla_strips=False)
-                write_whole(path, lambda unfinished: _write(unfinished, options.influences, sorted(rigs)))
+                write_whole(path, lambda own: left_out.extend(_write(own, options.influences, sorted(rigs))))
             except RuntimeError as error:
                 # The exporter's error, with everything that Blender printed.
                 raise SinewError(f"{path}: can not be written: {files.telling_line(error)}") from None
@@ -117,15 +118,27 @@ def write_apart(task: dict, report: Callable[..., None]) -> dict:
     }
 
 
-def _write(path: Path, influences: int, rigs: list[str]) -> None:
+def _write(path: Path, influences: int, rigs: list[str]) -> list[str]:
+    """Returns a sentence for each armature that the file does not have as it should."""
     # If the exporter fails, Blender prints a traceback and raises it as an error.
-    with redirect_stderr(io.StringIO()):
+    kind = {".glb": "gltf", ".vrm": "gltf", ".usdc": "usd"}.get(path.suffix.lower())
+    recorded = usd_scales.recorded() if kind == "usd" else nullcontext()
+    with redirect_stderr(io.StringIO()), recorded as scales:
         if path.suffix.lower() == ".vrm":
             _vrm(str(path), rigs)
         else:
             _WRITERS[path.suffix.lower()](str(path), influences)
-    kind = {".glb": "gltf", ".vrm": "gltf", ".usdc": "usd"}.get(path.suffix.lower())
-    if kind is not None and not is_whole(path, kind):
+    if kind is not None:
+        _check_whole(path, kind)
+    if scales is None:
+        return []
+    said = scales.write(path)
+    _check_whole(path, "usd")
+    return said
+
+
+def _check_whole(path: Path, kind: str) -> None:
+    if not is_whole(path, kind):
         raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
 
 

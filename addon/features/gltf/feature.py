@@ -20,7 +20,7 @@ from ...ui.options import with_options
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
 from ..bake import bake_apart
-from . import export
+from . import export, players
 from .export_check import Check, ExportOptions
 
 # What was verified last, the largest difference first, by the session_uid of the scene. Nothing is stored in
@@ -71,6 +71,8 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         of_kind = ("influences",) if self.kind == ".glb" else ()
         for name in ("kind", *of_kind, "folder", "overwrite", "verify"):
             layout.prop(self, name)
+        if of_kind and self.influences > players.FOUR:
+            draw_text(layout, players.more_than_four(), icon="INFO")
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self.path = self.target(self.kind)

@@ -2,15 +2,14 @@
 """Reads the skinned meshes of a .usdc by Pixar's UsdSkel, which Blender brings along."""
 
 from collections.abc import Callable
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
-import bpy
 import numpy as np
 
 from ...base.errors import SinewError
 from .played import Played, of_sum_one
+from .usd_scales import has_pxr, pxr
 
 
 def read_usd(path: Path) -> list[Played]:
@@ -18,10 +17,9 @@ def read_usd(path: Path) -> list[Played]:
 
     Raises SinewError where this Blender keeps UsdSkel to itself, as before 4.4.
     """
-    if not hasattr(bpy.utils, "expose_bundled_modules"):
+    if not has_pxr():
         raise SinewError("USD files are verified by Blender 4.4 and newer")
-    bpy.utils.expose_bundled_modules()
-    usd, skel, geom = (import_module(f"pxr.{name}") for name in ("Usd", "UsdSkel", "UsdGeom"))
+    usd, skel, geom = pxr("Usd", "UsdSkel", "UsdGeom")
     stage = usd.Stage.Open(str(path))
     cache, found = skel.Cache(), []
     prims = list(stage.Traverse())

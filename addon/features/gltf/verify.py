@@ -20,9 +20,12 @@ from ...skinning.influences import Influences
 from ...skinning.vectors import transformed
 from . import played as readers
 from . import read_fbx, read_usd
-from .export_check import EXPLAINED, Check, Comparison, Seen, SeenFrame, damaged_bones, plain
+from .export_check import EXPLAINED, Check, Comparison, Seen, SeenFrame, damaged_bones, plain, shears
 from .played import Played
 
+# The cosine of an angle: axes of a bone that are farther from a right one are named.
+_SHEARED = 1e-3
+_NAMED_BONES = 5
 # The files that are glTF.
 GLTF = (".glb", ".vrm")
 
@@ -121,6 +124,8 @@ class _Mesh:
         self._world = np.array(obj.matrix_world, dtype=np.float64)
         self._bones_from_model = state.shown.frames[0].bones_from_model.astype(np.float64)
         self._influences: Influences | None = None
+        self._rig = properties.of(obj).armature.name
+        self._sheared: dict[str, None] = {}
         # At each frame, the values of shape keys.
         self._values: dict[float, dict[str, float]] = {}
         self.seen_frames: list[SeenFrame] = []
@@ -142,7 +147,11 @@ class _Mesh:
         motions = given.pose.astype(np.float64) @ self._from_rest
         axes = bones.rest_axes.astype(np.float64)
         flat = np.full(len(bones.rest) - len(bones.names), -1)
-        damaged = damaged_bones(motions @ axes, np.append(bones.parents, flat), kind)
+        poses, parents = motions @ axes, np.append(bones.parents, flat)
+        damaged = damaged_bones(poses, parents, kind)
+        for bone in np.flatnonzero(shears(poses, parents)[: len(bones.names)] > _SHEARED):
+            if rig.data.bones[bones.names[bone]].inherit_scale != "FULL":
+                self._sheared[bones.names[bone]] = None
         return SeenFrame(
             frame,
             transformed(final, world) if len(final) == len(shown) else shown,
@@ -182,7 +191,14 @@ class _Mesh:
             self._normals,
             self.frames,
             self.between,
+            self._names(),
         )
+
+    def _names(self) -> dict[str, str]:
+        sheared = list(self._sheared)
+        more = ", …" if len(sheared) > _NAMED_BONES else ""
+        of_bones = {"shear_scale": ", ".join(sheared[:_NAMED_BONES]) + more} if sheared else {}
+        return {**of_bones, "transforms": self._rig}
 
     def missing(self, count: int) -> str:
         """Why the file has not one skin of it, but so many."""

@@ -4,11 +4,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from mathutils.bvhtree import BVHTree
+import sinew
 
 from .metrics import Shape
 
-# Counting takes longer than all other measures together, so it is done only at this many frames, evenly
+# A shape takes as long as its other measures together, so it is counted only at this many frames, evenly
 # distributed.
 MOST_FRAMES = 8
 
@@ -19,12 +19,7 @@ def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> set[tuple[i
     points     [vertices, 3]
     triangles  int [triangles, 3]
     """
-    tree = BVHTree.FromPolygons(points.tolist(), triangles.tolist(), all_triangles=True)
-    pairs = np.array(tree.overlap(tree), dtype=np.int64).reshape(-1, 2)
-    pairs = pairs[pairs[:, 0] < pairs[:, 1]]
-    first, second = triangles[pairs[:, 0]], triangles[pairs[:, 1]]
-    apart = ~(first[:, :, None] == second[:, None, :]).any(axis=(1, 2))
-    return set(map(tuple, pairs[apart].tolist()))
+    return set(map(tuple, sinew.crossing_triangles(points, triangles).tolist()))
 
 
 def crossings(shape: Shape) -> set[tuple[int, int]]:

@@ -437,6 +437,14 @@ class Shape:
         return found
 
     @cached_property
+    def bends(self) -> np.ndarray:
+        """float64 [pairs of neighbours]: the angles between their normals, in radians; 0 beside a triangle
+        without area."""
+        first, second = (self.normals.take(side, axis=1) for side in self.surface.neighbours)
+        across = cross(first, second)
+        return np.arctan2(np.sqrt(dots(across, across)), dots(first, second))
+
+    @cached_property
     def volume(self) -> float:
         """In cubed units of the points; positive where faces point outwards. The sum of signed tetrahedra
         (divergence theorem); holes are closed by fans to the mean of their border."""
@@ -539,6 +547,8 @@ class Measured:
         volume   that the limb gains or loses, as a part of its own
         folded   the share of area that is folded against a neighbour, and is not at rest
         bulge    above zero, RMS
+        crease   by how many radians more an edge is bent than at rest, in the mean over that bend: an even
+                 bend is spread over many edges
         pinch    by how much the narrowest ring of its joints is narrower than NARROW of its width at rest
         """
         pose, rest, surface = self.pose, self.rest, self.shape.surface
@@ -567,12 +577,26 @@ class Measured:
             np.maximum.at(pinch, bones_of_rings, NARROW - ratios)
         found = {
             "pinch": pinch,
+            "crease": self._creases(),
             "stretch": np.sqrt(np.divide(sums, wholes, out=np.zeros(count), where=wholes > 0.0)),
             "volume": volume,
             "folded": np.divide(folds, of_all, out=np.zeros(count), where=of_all > 0.0),
             "bulge": np.sqrt(swollen),
         }
         return {name: np.where(pose.bent_areas > 0.0, values, np.nan) for name, values in found.items()}
+
+    def _creases(self) -> np.ndarray:
+        """float64 [bones], see by_limb(); 0 for a bone that bends nothing."""
+        pose, sides = self.pose, np.stack(self.shape.surface.neighbours)
+        taken = pose.bent_triangles[sides].any(axis=0)
+        more = np.tile((self.shape.bends - self.rest.bends)[taken].clip(min=0.0), 2)
+        limbs = pose.skin.limb_of_triangles[sides[:, taken]].ravel()
+        # A triangle counts by its size, or a dense part of the mesh would decide.
+        more, limbs, widths = (
+            each[limbs >= 0] for each in (more, limbs, np.sqrt(self.rest.areas)[sides[:, taken]].ravel())
+        )
+        squares, sums = (np.bincount(limbs, widths * each, pose.bone_count) for each in (more * more, more))
+        return np.divide(squares, sums, out=np.zeros(pose.bone_count), where=sums > 0.0)
 
     def summary(self) -> Summary:
         entries: dict[str, Any] = {field.name: self.entry(field.name) for field in fields(Summary)}

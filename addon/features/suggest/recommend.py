@@ -75,9 +75,6 @@ def search(
     moments = [_with_crossings(name, moment, k, len(named)) for k, (name, moment) in enumerate(named)]
     if not moments:
         return Choice(Variant.of("lbs"))
-    subject = moments[0].moment.subject
-    skin = moments[0].moment.pose.skin
-    crude = recommendation.is_crude(skin.influences, subject.gauge.surface.edges)
 
     def measure(variant: Variant, number: int) -> recommendation.Values:
         _name, moment, at_rest = moments[number]
@@ -89,7 +86,7 @@ def search(
 
     names = [(each.name, np.sqrt(each.moment.pose.bent_areas)) for each in moments]
     diagonal = moments[0].moment.pose.rest.diagonal
-    steps = recommendation.search(measure, names, diagonal, crude)
+    steps = recommendation.search(measure, names, diagonal)
     return (yield from as_part(steps, LOOKING, 1.0 - LOOKING))
 
 

@@ -16,7 +16,6 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.phrases import Phrase, phrase
-from ...skinning.influences import Influences, owners_of
 from ...skinning.variants import Variant
 from ..measure.metrics import Measured
 from ..measure.suggestion import LONGEST, TEARS
@@ -32,14 +31,12 @@ class Candidate:
     name   of a method or of a stage
     gain   how much better it has to be: the logarithm of a value that sums up all measures
     why    what it does where it is kept
-    crude  it is tried only where weights are
     often  in which share of the moments it has to be better
     """
 
     name: str
     gain: float
     why: str
-    crude: bool = False
     often: float = 0.0
 
 
@@ -51,11 +48,8 @@ METHODS = (
 STAGES = (
     Candidate("twist_spread", 0.05, "twists spread along the limbs"),
     Candidate("bulge_limit", 0.05, "bent joints bulge less"),
-    Candidate("delta_mush", 0.2, "creases are smoothed", crude=True, often=0.25),
+    Candidate("delta_mush", 0.2, "creases are smoothed", often=0.25),
 )
-# The weights of a vertex differ from those of its neighbour by so much, in the mean over where they differ:
-# joints have no more than two edges to bend in.
-CRUDE = 0.45
 
 
 class Measure(NamedTuple):
@@ -73,6 +67,7 @@ MEASURES = {
     "folded": Measure(1.0, 0.02),
     "bulge": Measure(2.0, 0.005),
     "pinch": Measure(2.0, 0.1),
+    "crease": Measure(1.0, 0.3),
     "crossings": Measure(1.0, 20.0),
 }
 """Of a limb: those of metrics.Measured.by_limb(), and how many of its triangles cross others."""
@@ -100,16 +95,14 @@ def search(
     measure: Callable[[Variant, int], Values],
     moments: Sequence[tuple[str, np.ndarray]],
     diagonal: float,
-    is_crude: bool,
 ) -> Generator[float, None, Choice]:
     """Yields the progress; returns the choice.
 
     measure   the values of a variant in a moment, as from values_of()
     moments   names, for people, with the weights of the limbs
     diagonal  of the rest shape
-    is_crude  the weights are
     """
-    candidates = [each for each in (*METHODS, *STAGES) if is_crude or not each.crude]
+    candidates = (*METHODS, *STAGES)
     best, whys = Variant.of(METHODS[0].name), {"": phrase(METHODS[0].why)}
     known: list[Values] = []
     done, of_all = 0, len(candidates) * len(moments)
@@ -181,18 +174,3 @@ def values_of(measured: Measured, crossing: np.ndarray | None) -> Values:
         limbs = measured.pose.skin.limb_of_triangles[crossing]
         found["crossings"] = np.bincount(limbs[limbs >= 0], minlength=measured.pose.bone_count)
     return found
-
-
-def is_crude(influences: Influences, edges: np.ndarray) -> bool:
-    """Whether weights jump from a vertex to the next, instead of changing over some edges.
-
-    edges  int [edges, 2]
-    """
-    owners, jumps = owners_of(influences.counts), np.zeros(len(edges))
-    for bone in np.unique(influences.bones):
-        own = influences.bones == bone
-        weights = np.zeros(len(influences.counts))
-        weights[owners[own]] = influences.weights[own]
-        jumps += 0.5 * np.abs(np.diff(weights[edges], axis=1)[:, 0])
-    # Each edge counts by how much changes over it.
-    return bool((jumps * jumps).sum() > CRUDE * jumps.sum())

@@ -244,7 +244,7 @@ if "ddm" in {method.name for method in sinew.methods()}:
 # Every call that takes `threads`.
 THREADED = (
     *("deform", "limit", "spread", "mush", "compute", "deform_skinned", "deform_normals"),
-    *("centres", "moments"),
+    *("centres", "moments", "crossing_triangles"),
 )
 
 

@@ -11,7 +11,7 @@ from . import dual
 from . import quat
 from . import interpolate
 from . import spline
-__all__: list = ['Parameter', 'Method', 'Stage', 'methods', 'stages', 'Skeleton', 'Binding', 'Deformer', 'Normals', 'SkinnedNormals', 'Precomputation', 'centres_of_rotation', 'direct_delta_mush', 'Lock', 'thread_id', 'keep_thread_state', 'weights_in_memory', 'TwistSpread', 'BulgeLimit', 'DeltaMush']
+__all__: list = ['Parameter', 'Method', 'Stage', 'methods', 'stages', 'Skeleton', 'Binding', 'Deformer', 'Normals', 'SkinnedNormals', 'Precomputation', 'centres_of_rotation', 'direct_delta_mush', 'Lock', 'thread_id', 'keep_thread_state', 'weights_in_memory', 'crossing_triangles', 'TwistSpread', 'BulgeLimit', 'DeltaMush']
 class Parameter:
     """A setting of a method or of a stage."""
     def __repr__(self) -> str: ...
@@ -448,6 +448,14 @@ def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: 
     exact: compute by the definition itself, which is slow; otherwise triangles of similar weights are summed.
     gives_way: at a low priority, so that frames which are deformed meanwhile lose little; on a busy machine it then
         takes much longer.
+    """
+def crossing_triangles(points: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.int32]:
+    """Pairs of triangles of a surface that cross, int32 [pairs, 2]: an edge of one meets the other, and they
+    share no vertex. The lower index comes first, and pairs ascend. Triangles in one plane do not cross, nor do those of
+    points that are NaN.
+
+    points: float64 [vertices, 3].
+    triangles: int32 [triangles, 3].
     """
 def direct_delta_mush(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
     """Starts to compute the vertex data of the method "ddm": the moments of each bone's smoothed weights around

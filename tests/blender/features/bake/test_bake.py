@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 import signal
 import struct
 import time
@@ -13,7 +14,7 @@ import program
 import pytest
 import scenes
 from program import checked, run_sinew, without_sinew
-from sinew_addon.attach import properties
+from sinew_addon.attach import attach, properties
 from sinew_addon.base.errors import SinewError
 from sinew_addon.features.bake import bake, baked_files
 from sinew_addon.io import actions
@@ -123,6 +124,41 @@ def test_chosen_frames_and_straight_lines_between(arm, tmp_path, kind):
     read = read_elsewhere(tmp_path / "out" / "arm.blend", asked, tmp_path)["Arm"]
     expected = np.stack([at[0], at[0], (at[0] + at[1]) / 2, at[1], at[2], at[2]])
     assert scenes.worst(read, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.parametrize(
+    "frames", [[4, 5, 6, 7, 8], [4, 6, 8, 10], [3, 4.5, 9]], ids=["each", "second", "some"]
+)
+@pytest.mark.parametrize("kind", ["mdd", "pc2"])
+def test_caches_play_in_another_file_as_the_command_says(arm, tmp_path, kind, frames):
+    obj, path = arm
+    expected = shown(obj, frames)
+    scenes.save(path)
+    words = (
+        "--method",
+        METHOD,
+        "--to",
+        kind,
+        "--frames",
+        ",".join(map(str, frames)),
+        "--out",
+        tmp_path / "out",
+    )
+    said = run_sinew("bake", path, *words).stderr
+    attach.remove(obj)
+    obj.modifiers.clear()
+    cache = obj.modifiers.new("Cache", "MESH_CACHE")
+    cache.cache_format, cache.filepath = kind.upper(), str(tmp_path / "out" / "arm_cache" / f"Arm.{kind}")
+    if "Time Mode to Time" in said:
+        cache.time_mode = "TIME"
+    elif "key Mesh Cache's Evaluation Frame" in said:
+        cache.play_mode = "CUSTOM"
+        scenes.key(cache, "eval_frame", [(frame, number) for number, frame in enumerate(frames)])
+    else:
+        cache.frame_start = float(re.search(r"Start Frame to ([\d.]+)", said)[1])
+        scale = re.search(r"Frame Scale to ([\d.]+)", said)
+        cache.frame_scale = float(scale[1]) if scale else 1.0
+    assert scenes.worst(scenes.shapes(obj, frames), expected) <= TOLERANCE * scenes.diagonal(obj)
 
 
 @pytest.mark.parametrize("kind", ["alembic", "usd"])

@@ -68,6 +68,31 @@ def skip_without_reader(ending):
         pytest.importorskip("ufbx")
 
 
+def add_control(rig):
+    bpy.context.view_layer.objects.active = rig
+    bpy.ops.object.mode_set(mode="EDIT")
+    bone = rig.data.edit_bones.new("control")
+    bone.tail, bone.use_deform = (0.0, 0.0, 1.0), False
+    bpy.ops.object.mode_set(mode="OBJECT")
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+@pytest.mark.parametrize("is_in_a_group", [False, True], ids=["none", "of_control"])
+def test_vertices_that_no_bone_moves(scene, tmp_path, ending, is_in_a_group):
+    """In no group, or in that of a bone which does not deform and moves."""
+    skip_without_reader(ending)
+    obj, rig = scene
+    for group in obj.vertex_groups:
+        group.remove([100, 101, 150])
+    if is_in_a_group:
+        add_control(rig)
+        scenes.key(rig.pose.bones["control"], "location", ((1, (0, 0, 0)), (11, (0.0, 0.0, 2.0))))
+        obj.vertex_groups.new(name="control").add([100, 101, 20], 0.5, "REPLACE")
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == set()
+    assert mesh["total"]["largest"] <= 1e-6 * mesh["diagonal"]
+
+
 def plant(cause, obj, rig):
     """Returns options of the command."""
     if cause == "method":
@@ -102,6 +127,33 @@ def test_each_cause_alone(scene, tmp_path, cause):
     assert distance > 1e-3 * mesh["diagonal"]
     assert np.isclose(distance, mesh["total"]["largest"], rtol=1e-3)
     assert np.isclose(mesh["causes"][cause]["mean"], mesh["total"]["mean"], rtol=1e-3)
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+@pytest.mark.parametrize("mode", ["NONE", "FULL"])
+def test_unequal_scale(scene, tmp_path, ending, mode):
+    """The bone below is named, unless its Inherit Scale is Full, which is exact."""
+    skip_without_reader(ending)
+    _obj, rig = scene
+    rig.data.bones[2].inherit_scale = mode
+    scenes.key(rig.pose.bones[1], "scale", ((1, (1.0, 1.75, 0.5)), (11, (1.0, 1.75, 0.5))))
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == (set() if mode == "FULL" else {"shear_scale"})
+    assert mesh["explained"]
+    assert mesh["names"].get("shear_scale") == (None if mode == "FULL" else "bone.2")
+
+
+@pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
+def test_a_mesh_that_is_not_the_armatures_child(scene, tmp_path, ending):
+    """As the armature object moves, the mesh stays in Blender, and moves in the file."""
+    skip_without_reader(ending)
+    obj, rig = scene
+    obj.parent = None
+    scenes.key(rig, "location", ((1, (0, 0, 0)), (11, (0, 0, 3))))
+    mesh = exported(tmp_path, ending=ending)
+    assert found_causes(mesh) == {"transforms"}
+    assert mesh["names"]["transforms"] == "Arm Rig"
+    assert np.isclose(mesh["causes"]["transforms"]["largest"], mesh["total"]["largest"], rtol=1e-3)
 
 
 @pytest.mark.parametrize("ending", [".glb", ".fbx"])
@@ -270,6 +322,22 @@ def test_half_floats_of_usd(empty_file, tmp_path):
     assert mesh["explained"]
 
 
+@pytest.mark.parametrize("scales", [(1.0, 1.008), (0.02, 0.029), (1.0, 1.1)])
+def test_slow_scales_of_usd(scene, tmp_path, scales):
+    """Exact but for half floats, 2**-12 of a number at most; before 4.4 a sentence says what is lost."""
+    _obj, rig = scene
+    scenes.key(rig.pose.bones[1], "scale", [(1, (scales[0],) * 3), (100, (scales[1],) * 3)])
+    bpy.context.scene.frame_end = 100
+    if bpy.app.version >= (4, 4, 0):
+        mesh = exported(tmp_path, ending=".usdc")
+        assert found_causes(mesh) == {"shear_scale"}
+        assert mesh["total"]["largest"] < 2**-11 * scales[1] * mesh["diagonal"]
+    else:
+        scenes.save(tmp_path / "arm.blend")
+        words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out", tmp_path / "arm.usdc")
+        assert "bones' scales are up to 0.0" in run_sinew(*words, status=1).stderr
+
+
 def test_between_frames(scene, tmp_path):
     """The distance in the middle between frames is that of Blender's shape from the file's."""
     obj, rig = scene
@@ -289,6 +357,15 @@ def test_between_frames(scene, tmp_path):
 def test_the_limit_of_the_user(scene, tmp_path):
     exported(tmp_path, "--at-most", "50", method="dq")
     exported(tmp_path, "--at-most", "0.1", method="dq", status=1)
+
+
+def test_more_than_four_influences(scene, tmp_path):
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out")
+    said = run_sinew(*words, tmp_path / "a.glb", "--influences", "8").stderr
+    assert "Blender, Godot play more than four influences; F3D, panda3d, " in said
+    assert "more than four" not in run_sinew(*words, tmp_path / "b.glb").stderr
+    assert "more than four" not in run_sinew(*words, tmp_path / "c.usdc", "--influences", "8").stderr
 
 
 def test_sentences(scene, tmp_path):

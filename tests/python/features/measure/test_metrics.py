@@ -207,6 +207,21 @@ def test_a_ring_of_a_joint_that_collapses_is_pinched(tube):
     np.testing.assert_allclose(bent, 0.8 - 0.5, atol=0.05)
 
 
+def test_a_bend_that_few_edges_take_is_a_crease(tube):
+    """A step of weights bends at one ring, by the whole angle; smooth weights spread the same bend."""
+    bend = about([0, 0, 1], 60)
+    smooth = tube.measure("lbs", bend).by_limb()["crease"]
+    measured = tube.measure("lbs", IDENTITY)
+    points = tube.rest.copy()
+    behind = points[:, 0] > 0.0
+    points[behind] = points[behind] @ bend[:3, :3].T
+    moved = tube.measure("lbs", bend).pose
+    step = Measured(moved, Shape(tube.surface, points), None).by_limb()["crease"]
+    assert (smooth < 0.25).all()
+    assert (step > 0.5).all()
+    np.testing.assert_array_equal(np.nan_to_num(measured.by_limb()["crease"]), 0.0)
+
+
 def test_several_meshes_are_measured_as_one():
     a, b = MESHES["ball"], MESHES["box"]
     both = joined([surface_of(a), surface_of(b)])
