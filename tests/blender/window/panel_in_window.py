@@ -313,7 +313,7 @@ def suggested_by_click() -> Iterator[None]:
     from bl_ext.user_default.sinew.features.suggest import recommend
 
     check("one for all", len(set(methods())), 1)
-    check("the recommended one", methods()[0], recommend.choices[scene().session_uid].method)
+    check("the recommended one", methods()[0], recommend.choices[scene().session_uid].variant.method)
     with window.in_view3d():
         bpy.ops.sinew.suggestions_by(measure="crossings")
     yield from window.wait(4)
