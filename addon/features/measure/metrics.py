@@ -587,7 +587,7 @@ class Measured:
 
     def _creases(self) -> np.ndarray:
         """float64 [bones], see by_limb(); 0 for a bone that bends nothing."""
-        pose, sides = self.pose, np.stack(self.shape.surface.neighbours)
+        pose, sides = self.pose, self.shape.surface.neighbours
         taken = pose.bent_triangles[sides].any(axis=0)
         more = np.tile((self.shape.bends - self.rest.bends)[taken].clip(min=0.0), 2)
         limbs = pose.skin.limb_of_triangles[sides[:, taken]].ravel()

@@ -363,8 +363,8 @@ def test_human(tmp_path, real_rig, chosen):
     numbers.data.foreach_set("value", np.arange(len(obj.data.vertices), dtype=np.float32))
     use(obj, chosen)
     if chosen == "recommended":
-        # It chooses this one where joints bend more than in these frames.
-        obj.sinew.bulge_limit.enabled = True
+        # It chooses this one where joints bend more than in these frames, and one that no player has.
+        obj.sinew.bulge_limit.enabled, obj.sinew.delta_mush.enabled = True, False
     file = write(glb, export_all_influences=True)
     content = file.header["meshes"][0]["extensions"]["SINEW_skinning"]
     assert content.get("stages") == (None if chosen == "cor" else ["twist_spread", "bulge_limit"])
