@@ -54,8 +54,8 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     told += [f"{obj.name}: {sentence}" for obj in by_sinew for sentence in other_tools.notes(obj)]
     if unequal := [obj.name for obj in enabled if _has_other_sums(obj)]:
         told.append(
-            f"{', '.join(unequal)}: weights do not sum to 1, which Blender divides by, and other programs may "
-            "not (Weights > Normalize All)"
+            f"{', '.join(unequal)}: weights do not sum to 1, which Blender divides by, and other programs "
+            "may not (Weights > Normalize All)"
         )
     if by_sinew:
         told.append(other_tools.APPLYING)

@@ -118,7 +118,9 @@ def plant(cause, obj, rig):
     return {}
 
 
-@pytest.mark.parametrize("cause", [c for c in CAUSES if c not in ("bendy", "sampling", "actions", "rest")])
+@pytest.mark.parametrize(
+    "cause", [c for c in CAUSES if c not in ("bendy", "several", "sampling", "actions", "rest")]
+)
 def test_each_cause_alone(scene, tmp_path, cause):
     planted = plant(cause, *scene)
     mesh = exported(tmp_path, *planted.get("options", ()), method=planted.get("method", "lbs"))
@@ -127,6 +129,21 @@ def test_each_cause_alone(scene, tmp_path, cause):
     assert distance > 1e-3 * mesh["diagonal"]
     assert np.isclose(distance, mesh["total"]["largest"], rtol=1e-3)
     assert np.isclose(mesh["causes"][cause]["mean"], mesh["total"]["mean"], rtol=1e-3)
+
+
+def test_several_armature_modifiers(scene, tmp_path):
+    """The file has the first; a .glb lacks Sinew's data, which is an error."""
+    obj, rig = scene
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object, second.vertex_group = rig, "bone.1"
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--verify", "--json", "--out")
+    said = json.loads(run_sinew(*words, tmp_path / "arm.glb", status=1).stdout)
+    (mesh,) = said["meshes"]
+    assert found_causes(mesh) == {"several"}
+    assert mesh["causes"]["several"]["largest"] > 0.05 * mesh["diagonal"]
+    assert mesh["explained"]
+    assert ["several Armature modifiers" in error for error in said["errors"]] == [True]
 
 
 @pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
