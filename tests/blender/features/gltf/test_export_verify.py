@@ -376,6 +376,16 @@ def test_the_limit_of_the_user(scene, tmp_path):
     exported(tmp_path, "--at-most", "0.1", method="dq", status=1)
 
 
+@pytest.mark.parametrize(("method", "scale"), [("dq", -1.0), ("dq", 1.0), ("lbs", -1.0)])
+def test_a_mirrored_bone_in_usd(scene, tmp_path, method, scale):
+    _obj, rig = scene
+    scenes.key(rig.pose.bones[2], "scale", [(1, (scale, 1.0, 1.0))])
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", method, "--out", tmp_path / "a.usdc")
+    said = "are mirrored, such as bone.2" in run_sinew(*words).stderr
+    assert said == (method == "dq" and scale < 0.0)
+
+
 def test_more_than_four_influences(scene, tmp_path):
     scenes.save(tmp_path / "arm.blend")
     words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out")
