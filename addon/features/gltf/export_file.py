@@ -104,8 +104,8 @@ def write(
 
 
 def mirrored(skinned: list[bpy.types.Object]) -> list[str]:
-    """A sentence for each mesh of the method `dq` with a bone that is mirrored now: where such a bone blends
-    with another, the dual quaternions of UsdSkel have no room for a mirror image, and draw points together."""
+    """A sentence for each mesh of the method `dq` with a bone that is mirrored now: where it blends with
+    another, the dual quaternions of UsdSkel draw points together."""
     depsgraph, found = bpy.context.evaluated_depsgraph_get(), []
     for obj in skinned:
         rigs = properties.of(obj).armatures if properties.of(obj).method == "dq" else []
@@ -114,8 +114,8 @@ def mirrored(skinned: list[bpy.types.Object]) -> list[str]:
             names = [bone.name for bone in bones if bone.bone.use_deform and bone.matrix.determinant() < 0.0]
             if names:
                 found.append(
-                    f"{obj.name}: bones of {rig.name} are mirrored, such as {names[0]}: keep the file's skinning "
-                    "method classicLinear, as UsdSkel's dualQuaternion collapses there"
+                    f"{obj.name}: bones of {rig.name} are mirrored, such as {names[0]}: keep the file's "
+                    "skinning method classicLinear, as UsdSkel's dualQuaternion collapses there"
                 )
     return found
 
