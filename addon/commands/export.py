@@ -63,6 +63,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
     # Blender does not evaluate hidden objects.
     with characters.shown(meshes):
         left_out, skinned = _skinned(args, meshes, console)
+        if args.out.suffix.lower() == ".usdc":
+            console.note_on(args.out, export_file.mirrored(skinned))
         written = export_file.write(args.out, skinned, options)
     left_out += written.left_out
     for sentence in left_out:

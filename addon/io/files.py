@@ -2,10 +2,12 @@
 """Opens files, and saves copies so that an existing file is never left half-written."""
 
 import errno
+import io
 import os
 import re
 import struct
 from collections.abc import Callable, Sequence
+from contextlib import redirect_stderr
 from pathlib import Path
 
 import bpy
@@ -33,6 +35,8 @@ SKIPPABLE_HEADER = 8
 LAST_BLOCK = (24, 32)
 
 
+# Of glTF, which Blender reads by libraries of its own.
+_CODECS = ("Draco", "Meshopt")
 # What Blender and Python put before the actual message.
 _ABOUT_ERROR = re.compile(r"^((Error|OSError): |\[Errno \d+\] )+")
 
@@ -57,7 +61,7 @@ def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> list[
                 bpy.ops.wm.open_mainfile(filepath=str(path), load_ui=load_ui, use_scripts=scripts)
             else:
                 bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
-                importer(str(path))
+                _import(importer, path)
                 _use_frames_of_animation()
     except RuntimeError as error:
         # Blender repeats the file name, up to twice, before the reason or behind it.
@@ -66,8 +70,26 @@ def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> list[
         if reason == "not a blend file":
             # It begins like a .blend, and older Blenders report nothing else for files of newer ones.
             reason += f", or of a Blender newer than {bpy.app.version_string}"
+        for codec in _CODECS:
+            if importer is not None and codec.lower() in reason.lower():
+                # bpy as a module comes without these libraries (seen on 4.2 and 5.3; 4.5 has Draco's).
+                reason = (
+                    f"it is compressed by {codec}, for which this Blender has no library; use a whole "
+                    "Blender, or write the file without compression"
+                )
         raise SinewError(f"{path}: Blender can not read it: {reason}") from None
     return [*_leave_modes(), *sentences]
+
+
+def _import(importer: Callable[[str], object], path: Path) -> None:
+    """Leaves nothing of a file that can not be read to its end."""
+    try:
+        # An importer's own traceback, which its error has, too.
+        with redirect_stderr(io.StringIO()):
+            importer(str(path))
+    except RuntimeError:
+        bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
+        raise
 
 
 def _leave_modes() -> list[str]:

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ...attach import properties
+from ...attach import properties, stage_settings
 from ...base.errors import SinewError
 from ...base.output import remove, unfinished_path, writing
 from ...deform import characters
@@ -86,7 +86,7 @@ class SceneExport(Started):
 
     def sample(self) -> Generator[float, None, None]:
         first, last = int(self.frames[0]), int(self.frames[-1])
-        with self.whole_or_nothing(), _frames_of_scene(first, last):
+        with self.whole_or_nothing(), _frames_of_scene(first, last), _without_own_groups(self.meshes):
             with selected([*self.meshes, *self.carried]), self._reporting_frames():
                 self._export(first, last)
             for obj in self.meshes:
@@ -153,6 +153,43 @@ def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
         for obj in bpy.context.view_layer.objects
         if obj.type == "MESH" and obj not in meshes and obj.visible_get() and hangs_on_bone(obj)
     ]
+
+
+@contextmanager
+def _without_own_groups(meshes: list[bpy.types.Object]) -> Iterator[None]:
+    """Context in which the final meshes lack the vertex groups of stages, which Alembic has with all others
+    from 5.3 on."""
+    added, trees = [], []
+    for obj in meshes:
+        bones = {bone.name for armature in properties.of(obj).armatures for bone in armature.data.bones}
+        names = set(stage_settings.vertex_groups(properties.of(obj)).values()) & set(obj.vertex_groups.keys())
+        if names - bones:
+            modifier = obj.modifiers.new("Sinew Groups", "NODES")
+            modifier.node_group = _removing(sorted(names - bones))
+            added.append((obj, modifier))
+            trees.append(modifier.node_group)
+    try:
+        yield
+    finally:
+        for obj, modifier in added:
+            obj.modifiers.remove(modifier)
+        for tree in trees:
+            bpy.data.node_groups.remove(tree)
+
+
+def _removing(names: list[str]) -> bpy.types.NodeTree:
+    """Nodes that remove attributes of these names."""
+    tree = bpy.data.node_groups.new("Sinew Groups", "GeometryNodeTree")
+    for direction in ("INPUT", "OUTPUT"):
+        tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
+    last = tree.nodes.new("NodeGroupInput").outputs[0]
+    for name in names:
+        node = tree.nodes.new("GeometryNodeRemoveAttribute")
+        node.inputs["Name"].default_value = name
+        tree.links.new(last, node.inputs["Geometry"])
+        last = node.outputs["Geometry"]
+    tree.links.new(last, tree.nodes.new("NodeGroupOutput").inputs[0])
+    return tree
 
 
 @contextmanager

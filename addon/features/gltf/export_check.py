@@ -28,6 +28,7 @@ _NEAR_LIMIT, _ROUNDED = 0.99, 0.01
 CAUSES: dict[str, str] = {
     "modifiers": "modifiers behind the armature, which the file leaves out",
     "method": "method and stages, where engines blend linearly",
+    "several": "further Armature modifiers, as the file has the first, and method and stages",
     "pose": "a pose without keys, where the file has no animation and plays the rest pose",
     "bendy": "bendy bones",
     "influences": "influences that were cut, or are of envelopes",
@@ -99,6 +100,7 @@ class Seen:
     influences   the largest number of a vertex that was exported; 0 for all
     has_envelopes  bones' envelopes have a part in the influences; files do not
     has_keys       it has shape keys
+    has_several    more than one Armature modifier deforms it; bones are those of the first
     corners        int [corners], the vertex of each corner of its faces
     normals        float32 [corners, 3], at rest, object space
     names          of what causes it, for those of NAMED
@@ -110,6 +112,7 @@ class Seen:
     influences: int
     has_envelopes: bool
     has_keys: bool
+    has_several: bool
     corners: np.ndarray
     normals: np.ndarray
     frames: list[SeenFrame] = field(default_factory=list)
@@ -296,7 +299,7 @@ class Comparison:
             bound = blended(*own, each.bound, rest)
             pairs["total"].append((played, each.seen[at]))
             pairs["modifiers"].append((each.seen[at], each.shown[at]))
-            pairs["method"].append((each.shown[at], linear))
+            pairs["several" if seen.has_several else "method"].append((each.shown[at], linear))
             pairs["pose"].append((blended(*own, expected, rest), bound))
             pairs["bendy"].append((constant, linear))
             pairs["influences"].append((blended(*cut, each.motions, rest), constant))

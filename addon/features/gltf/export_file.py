@@ -103,6 +103,23 @@ def write(
     return Written(bendy, checks, left_out)
 
 
+def mirrored(skinned: list[bpy.types.Object]) -> list[str]:
+    """A sentence for each mesh of the method `dq` with a bone that is mirrored now: where it blends with
+    another, the dual quaternions of UsdSkel draw points together."""
+    depsgraph, found = bpy.context.evaluated_depsgraph_get(), []
+    for obj in skinned:
+        rigs = properties.of(obj).armatures if properties.of(obj).method == "dq" else []
+        for rig in rigs:
+            bones = rig.evaluated_get(depsgraph).pose.bones
+            names = [bone.name for bone in bones if bone.bone.use_deform and bone.matrix.determinant() < 0.0]
+            if names:
+                found.append(
+                    f"{obj.name}: bones of {rig.name} are mirrored, such as {names[0]}: keep the file's "
+                    "skinning method classicLinear, as UsdSkel's dualQuaternion collapses there"
+                )
+    return found
+
+
 def write_apart(task: dict, report: Callable[..., None]) -> dict:
     """Runs in the second Blender: the task of the operator."""
     skinned = bake_apart.open_copy(task, report)

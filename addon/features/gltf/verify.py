@@ -119,6 +119,7 @@ class _Mesh:
         self._from_rest = np.linalg.inv(self.bones.rest.astype(np.float64))
         self._basis = mesh_io.read_points(obj.data).astype(np.float64)
         self._has_keys = obj.data.shape_keys is not None
+        self._has_several = len(properties.of(obj).replaced_modifiers) > 1
         self._corners = mesh_io.corner_vertices(obj.data)
         self._normals = mesh_io.corner_normals(obj.data)
         self._world = np.array(obj.matrix_world, dtype=np.float64)
@@ -187,6 +188,7 @@ class _Mesh:
             influences,
             has_envelopes,
             self._has_keys,
+            self._has_several,
             self._corners,
             self._normals,
             self.frames,
@@ -277,8 +279,8 @@ def _near(points: np.ndarray, others: np.ndarray, distance: float) -> list[list[
 
 def _reason(obj: bpy.types.Object, state: SkinnedObject) -> str:
     """Why it can not be compared; empty where it can."""
-    if len(properties.of(obj).replaced_modifiers) != 1 or state.shown.frames[0] is None:
-        return "several Armature modifiers deform it"
+    if state.shown.frames[0] is None:
+        return "its first Armature modifier is switched off"
     try:
         upstream_proxy.check_not_needed(obj, "which the file leaves out")
     except SinewError as error:

@@ -6,12 +6,17 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import bpy
+import numpy as np
 
 from ...attach import attach, layout, other_tools, properties, upstream_proxy
 from ...attach.updates import updates_suspended
 from ...base.errors import SinewError
 from ...deform import characters, session
-from ...io import files
+from ...io import files, mesh_io
+from ...skinning.influences import entries_of_bones
+
+# Painting leaves smaller differences.
+_OTHER_SUM = 0.01
 
 
 def check(task: dict, report: Callable[..., None]) -> dict:
@@ -47,6 +52,11 @@ def check(task: dict, report: Callable[..., None]) -> dict:
     problems += _not_deformable(skinned)
     by_sinew = [obj for obj in enabled if properties.of(obj).replaces_modifiers]
     told += [f"{obj.name}: {sentence}" for obj in by_sinew for sentence in other_tools.notes(obj)]
+    if unequal := [obj.name for obj in enabled if _has_other_sums(obj)]:
+        told.append(
+            f"{', '.join(unequal)}: weights do not sum to 1, which Blender divides by, and other programs "
+            "may not (Weights > Normalize All)"
+        )
     if by_sinew:
         told.append(other_tools.APPLYING)
     notes += [f"{name} is switched off: its Armature modifier deforms it" for name in off]
@@ -78,6 +88,15 @@ def _not_deformable(objects: list[bpy.types.Object]) -> Iterator[str]:
         characters.show(here)
         wanted = [(obj, properties.of(obj).method) for obj in here]
         yield from (str(error) for error in characters.use_methods(wanted) if error is not None)
+
+
+def _has_other_sums(obj: bpy.types.Object) -> bool:
+    """Whether weights of bones, where a vertex has some, sum to other than 1."""
+    deforming = {b.name for rig in properties.of(obj).armatures for b in rig.data.bones if b.use_deform}
+    of_bone = np.array([0 if group.name in deforming else -1 for group in obj.vertex_groups], dtype=np.int32)
+    entries = entries_of_bones(mesh_io.read_group_weights(obj.data), of_bone)
+    sums = np.bincount(entries.vertices, weights=entries.weights, minlength=len(entries.counts))
+    return bool((np.abs(sums - 1.0) > _OTHER_SUM)[sums > 0.0].any())
 
 
 def _is_missing(library: bpy.types.Library) -> bool:

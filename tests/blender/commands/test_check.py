@@ -58,6 +58,23 @@ def test_files_that_are_well(tmp_path):
     assert {path: path.read_bytes() for path in tmp_path.rglob("*.blend")} == before
 
 
+@pytest.mark.parametrize("amount", [1.0, 0.5])
+def test_weights_that_do_not_sum_to_one(tmp_path, amount):
+    """Those of groups without a bone do not count."""
+    obj, _armature = scenes.skinned_arm("dq")
+    everywhere = range(len(obj.data.vertices))
+    for group in obj.vertex_groups:
+        group.remove(everywhere)
+    obj.vertex_groups["bone.0"].add(everywhere, amount, "REPLACE")
+    obj.vertex_groups.new(name="Mask").add([1, 2, 3], 0.3, "REPLACE")
+    report = check(scenes.save(tmp_path / "sums.blend"))["sums.blend"]
+    said = [
+        note for note in report["notes"] if note.startswith("Arm: weights do not sum to 1, which Blender")
+    ]
+    assert len(said) == (amount != 1.0)
+    assert report["problems"] == []
+
+
 def test_what_is_switched_off_needs_no_sinew(tmp_path):
     obj, _armature = scenes.skinned_arm("dq")
     properties.of(obj).enabled = False

@@ -190,6 +190,25 @@ def test_caches_follow_what_stands_in_front_and_behind(arm, tmp_path, kind):
     assert not (tmp_path / "keys").exists()
 
 
+def test_alembic_has_no_groups_of_stages(arm, tmp_path):
+    """Blender's exporter writes all that the mesh has from 5.3 on; the stage's shape is in the file."""
+    obj, path = arm
+    obj.vertex_groups.new(name="of artist").add([0, 1], 0.5, "REPLACE")
+    obj.vertex_groups.new(name="of stage").add(range(40), 1.0, "REPLACE")
+    scenes.add_sinew(obj, METHOD)
+    stage = properties.of(obj).delta_mush
+    stage.enabled, stage.group = True, "of stage"
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.save(path)
+    run_sinew("bake", path, "--to", "alembic", "--frames", "1-11", "--out", tmp_path / "out")
+    data = (tmp_path / "out" / "arm.abc").read_bytes()
+    assert b"of stage" not in data.replace(b"_", b" ")
+    assert (b"of artist" in data.replace(b"_", b" ")) == (bpy.app.version >= (5, 3, 0))
+    read = read_elsewhere(tmp_path / "out" / "arm.abc", FRAMES, tmp_path)
+    (points,) = (read[name] for name in read if name not in ("uvs", "materials"))
+    assert scenes.worst(points, expected) <= TOLERANCE * scenes.diagonal(obj)
+
+
 @pytest.mark.parametrize("kind", ["mdd"])
 def test_a_number_of_vertices_that_changes_is_refused(arm, tmp_path, kind):
     obj, path = arm

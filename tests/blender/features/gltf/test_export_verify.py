@@ -118,7 +118,9 @@ def plant(cause, obj, rig):
     return {}
 
 
-@pytest.mark.parametrize("cause", [c for c in CAUSES if c not in ("bendy", "sampling", "actions", "rest")])
+@pytest.mark.parametrize(
+    "cause", [c for c in CAUSES if c not in ("bendy", "several", "sampling", "actions", "rest")]
+)
 def test_each_cause_alone(scene, tmp_path, cause):
     planted = plant(cause, *scene)
     mesh = exported(tmp_path, *planted.get("options", ()), method=planted.get("method", "lbs"))
@@ -127,6 +129,21 @@ def test_each_cause_alone(scene, tmp_path, cause):
     assert distance > 1e-3 * mesh["diagonal"]
     assert np.isclose(distance, mesh["total"]["largest"], rtol=1e-3)
     assert np.isclose(mesh["causes"][cause]["mean"], mesh["total"]["mean"], rtol=1e-3)
+
+
+def test_several_armature_modifiers(scene, tmp_path):
+    """The file has the first; a .glb lacks Sinew's data, which is an error."""
+    obj, rig = scene
+    second = obj.modifiers.new("Second", "ARMATURE")
+    second.object, second.vertex_group = rig, "bone.1"
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--verify", "--json", "--out")
+    said = json.loads(run_sinew(*words, tmp_path / "arm.glb", status=1).stdout)
+    (mesh,) = said["meshes"]
+    assert found_causes(mesh) == {"several"}
+    assert mesh["causes"]["several"]["largest"] > 0.05 * mesh["diagonal"]
+    assert mesh["explained"]
+    assert ["several Armature modifiers" in error for error in said["errors"]] == [True]
 
 
 @pytest.mark.parametrize("ending", [".glb", ".usdc", ".fbx"])
@@ -357,6 +374,16 @@ def test_between_frames(scene, tmp_path):
 def test_the_limit_of_the_user(scene, tmp_path):
     exported(tmp_path, "--at-most", "50", method="dq")
     exported(tmp_path, "--at-most", "0.1", method="dq", status=1)
+
+
+@pytest.mark.parametrize(("method", "scale"), [("dq", -1.0), ("dq", 1.0), ("lbs", -1.0)])
+def test_a_mirrored_bone_in_usd(scene, tmp_path, method, scale):
+    _obj, rig = scene
+    scenes.key(rig.pose.bones[2], "scale", [(1, (scale, 1.0, 1.0))])
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", method, "--out", tmp_path / "a.usdc")
+    said = "are mirrored, such as bone.2" in run_sinew(*words).stderr
+    assert said == (method == "dq" and scale < 0.0)
 
 
 def test_more_than_four_influences(scene, tmp_path):
