@@ -30,11 +30,11 @@ VIEW = (400, 500)
 # Positions in the sidebar.
 ADD, METHOD, SWITCH = (880, 125), (930, 128), (812, 151)
 # Headers of panels while all are closed; what Diagnostics has below its own.
-HEADER, DIAGNOSTICS = (850, 97), (850, 209)
-CHECK, MEND = (830, 266), (835, 417)
+HEADER, DIAGNOSTICS = (850, 97), (850, 265)
+CHECK, MEND = (830, 322), (835, 473)
 SUGGEST_BUTTON = (970, 151)
 # The header of Suggest, and the recommended method.
-SUGGEST, BEST = (850, 125), (880, 156)
+SUGGEST, BEST = (850, 153), (880, 184)
 # The height of the status bar in pixels.
 STATUS_BAR = 24
 # Positions in the list of methods.
