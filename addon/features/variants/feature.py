@@ -62,9 +62,9 @@ class SINEW_OT_use_variant(OnSinewObjects, bpy.types.Operator):
         if variant.method == FILE:
             raise SinewError("The character is as in the file already")
         if variant.method in PRESETS:
-            bpy.ops.sinew.recommend("INVOKE_DEFAULT")
-            # It is a step of its own.
-            return {"CANCELLED"}
+            done = bpy.ops.sinew.recommend("INVOKE_DEFAULT")
+            # In a window it goes on, as an undo step of its own.
+            return {"CANCELLED"} if "RUNNING_MODAL" in done else set(done)
         with session.changing(context):
             variant_settings.use(character.followers(context), variant)
         return None

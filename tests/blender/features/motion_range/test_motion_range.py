@@ -13,6 +13,7 @@ import scenes
 import whole_file
 from figures import NAMES, figure, named
 from program import run_script
+from sinew_addon.deform import session
 from sinew_addon.features.measure import battery, motion_range
 from sinew_addon.features.motion_range import clip
 from sinew_addon.io import armature_io
@@ -148,6 +149,68 @@ print([c.mute for b in rig.pose.bones for c in b.constraints])
     done = run_script(tmp_path / "read.py", text).stdout
     assert f"['{action}'] {action} True" in done
     assert "[False]" in done
+
+
+@pytest.mark.parametrize("how", ["start", "end", "keep"])
+def test_each_operator_is_one_undo_step(how):
+    obj, armature = make_figure("mixamo", 6)
+    obstruct(armature, "mixamo")
+    five_meshes.select(obj)
+    bpy.context.scene.frame_set(4)
+    if how != "start":
+        bpy.ops.sinew.motion_range()
+
+    def played() -> tuple[np.ndarray, np.ndarray, list[tuple[str, int]]]:
+        rig = bpy.data.objects["Rig"]
+        session.refresh(bpy.context)
+        return scenes.pose_of(rig), scenes.final_points(bpy.data.objects["Body"]), clip.poses_on(rig)
+
+    before, content = played(), whole_file.content()
+    bpy.ops.ed.undo_push(message="before")
+    # As a click: with the undo step that Blender pushes for the operator.
+    if how == "start":
+        assert bpy.ops.sinew.motion_range("EXEC_DEFAULT", True) == {"FINISHED"}
+    else:
+        assert bpy.ops.sinew.end_motion_range("EXEC_DEFAULT", True, keep=how == "keep") == {"FINISHED"}
+    after = played()
+    assert after[2] != before[2]
+    for undone, wanted in ((True, before), (False, after)):
+        (bpy.ops.ed.undo if undone else bpy.ops.ed.redo)()
+        found = played()
+        assert found[2] == wanted[2]
+        for one, other in zip(found[:2], wanted[:2], strict=True):
+            np.testing.assert_allclose(one, other, atol=1e-5)
+        if undone:
+            # Settings that Sinew has read are there, with their defaults.
+            whole_file.assert_same(content, but="sinew")
+
+
+def test_a_saved_copy_has_the_artists_own_and_a_file_opened_again_nothing(tmp_path):
+    obj, armature = make_figure("vrm", 2)
+    obstruct(armature, "vrm")
+    action = armature.animation_data.action.name
+    first = scenes.save(tmp_path / "first.blend")
+    bpy.context.scene.frame_set(4)
+    pose = scenes.pose_of(armature)
+    for what in ("copy", "reload", "new"):
+        five_meshes.select(bpy.data.objects["Body"])
+        assert bpy.ops.sinew.motion_range() == {"FINISHED"}
+        path = first
+        if what == "copy":
+            path = tmp_path / "copy.blend"
+            bpy.ops.wm.save_as_mainfile(filepath=str(path), copy=True)
+            assert not clip.armatures_on()
+            np.testing.assert_allclose(scenes.pose_of(bpy.data.objects["Rig"]), pose, atol=1e-6)
+        if what == "new":
+            bpy.ops.wm.read_homefile(use_empty=True)
+            assert not clip.armatures_on()
+        bpy.ops.wm.open_mainfile(filepath=str(path))
+        rig = bpy.data.objects["Rig"]
+        assert not clip.armatures_on()
+        assert not rig.is_property_set("sinew_motion_range")
+        assert ([a.name for a in bpy.data.actions], rig.animation_data.action.name) == ([action], action)
+        bpy.context.scene.frame_set(4)
+        np.testing.assert_allclose(scenes.pose_of(rig), pose, atol=1e-6)
 
 
 def test_what_can_not_play_one_says_why():
