@@ -25,6 +25,7 @@ VOLATILE = {
     "execution_time",
     "id_data",
     "is_evaluated",
+    "is_event_handling_break",
     "is_runtime_data",
     "keyconfigs",
     "loop_triangle_polygons",
@@ -37,6 +38,7 @@ VOLATILE = {
     "spaces",  # 4.2 crashes when an editor's content is read
     "tag",
     "token",  # of Sinew's settings: a session_uid, while its driver is there
+    "undo_stack",
     "uv_sculpt",  # and when its brush is read
     "vertex_normals",
     # Of a UV map, like edge_selection and pin. Reading one creates an attribute and so moves the map, whose
@@ -74,6 +76,10 @@ class Column:
             for i, (mine, theirs) in pairs
             if mine.tobytes() != theirs.tobytes()
         ]
+
+
+# Undo changes these as well: settings that Sinew has read, with their defaults; what no window shows (5.3).
+BY_UNDO = r"\bsinew\b|layer_collection\.is_visible"
 
 
 def of_open_file(only: str = "", named: str = "") -> dict[str, object]:

@@ -181,12 +181,11 @@ def test_each_operator_is_one_undo_step(how):
         for one, other in zip(found[:2], wanted[:2], strict=True):
             np.testing.assert_allclose(one, other, atol=1e-5)
         if undone:
-            # Settings that Sinew has read are there, with their defaults.
-            whole_file.assert_same(content, but="sinew")
+            whole_file.assert_same(content, whole_file.BY_UNDO)
 
 
 def test_a_saved_copy_has_the_artists_own_and_a_file_opened_again_nothing(tmp_path):
-    obj, armature = make_figure("vrm", 2)
+    _obj, armature = make_figure("vrm", 2)
     obstruct(armature, "vrm")
     action = armature.animation_data.action.name
     first = scenes.save(tmp_path / "first.blend")

@@ -59,6 +59,6 @@ def test_one_step(what):
     assert after[:2] != before[:2]
     bpy.ops.ed.undo()
     assert_state(before)
-    whole_file.assert_same(content, but="sinew")
+    whole_file.assert_same(content, whole_file.BY_UNDO)
     bpy.ops.ed.redo()
     assert_state(after)
