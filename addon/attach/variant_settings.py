@@ -1,10 +1,11 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Variants in an object's settings: what is set there as a variant, and back."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 
 import bpy
 
+from ..skinning import parameters
 from ..skinning.parameters import OFF, Value
 from ..skinning.variants import BLENDER, SETTINGS, Variant
 from . import properties, property_groups, stage_settings
@@ -25,14 +26,27 @@ def read(obj: bpy.types.Object) -> Variant:
 def use(objects: Iterable[bpy.types.Object], variant: Variant) -> None:
     """Sets a method with its stages, or the Armature modifier, on objects that have Sinew. The caller has
     them deformed."""
+    if variant.method != BLENDER:
+        use_values(objects, variant.method, variant.all_values | variant.settings)
+        return
+    for obj in objects:
+        property_groups.assign(properties.of(obj), "enabled", False)
+
+
+def use_values(objects: Iterable[bpy.types.Object], method: str, values: Mapping[str, Value]) -> None:
+    """Sets a method with values by full names, as use(); all others stay as they are."""
     for obj in objects:
         settings = properties.of(obj)
-        property_groups.assign(settings, "enabled", variant.method != BLENDER)
-        if variant.method == BLENDER:
-            continue
-        property_groups.assign(settings, "method", variant.method)
-        for name, value in (variant.all_values | variant.settings).items():
+        property_groups.assign(settings, "enabled", True)
+        property_groups.assign(settings, "method", method)
+        for name, value in values.items():
             assign(obj, name, value)
+
+
+def with_parameters(obj: bpy.types.Object, method: str, values: Mapping[str, Value]) -> dict[str, Value]:
+    """Returns values with the parameters of a method that they leave as an object has them."""
+    names = (name for name in parameters.by_full_name() if name.startswith(f"{method}."))
+    return {name: stored(obj, name) for name in names} | dict(values)
 
 
 def assign(obj: bpy.types.Object, name: str, value: Value) -> None:

@@ -153,7 +153,10 @@ def kept_choices(
             found, values, failed = _with_presets([(obj, name) for obj in meshes], {})
             for error in failed.values():
                 raise error
-            chosen[name] = {obj: (method, values[obj]) for obj, method in found}
+            chosen[name] = {
+                obj: (method, variant_settings.with_parameters(obj, method, values[obj]))
+                for obj, method in found
+            }
         for key, of_meshes in variants.items():
             chosen[key] = {
                 obj: chosen.get(of_meshes[obj].method, {}).get(obj) or _as_values(of_meshes[obj])
@@ -193,7 +196,8 @@ def with_presets(variants: Mapping[bpy.types.Object, Variant]) -> dict[bpy.types
     found, values, failed = _with_presets(wanted, {})
     for error in failed.values():
         raise error
-    return variants | {obj: Variant.of_values(method, values[obj]) for obj, method in found}
+    whole = {obj: variant_settings.with_parameters(obj, method, values[obj]) for obj, method in found}
+    return variants | {obj: Variant.of_values(method, whole[obj]) for obj, method in found}
 
 
 # The method of meshes while a preset is being chosen.

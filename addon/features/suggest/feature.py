@@ -177,7 +177,7 @@ class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
 
 def _use(context: bpy.types.Context, choice: Choice) -> None:
     with session.changing(context):
-        variant_settings.use(character.followers(context), choice.variant)
+        variant_settings.use_values(character.followers(context), choice.variant.method, choice.values)
 
 
 def _used(context: bpy.types.Context) -> set[str]:

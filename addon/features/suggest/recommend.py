@@ -162,4 +162,4 @@ def _angles(moment: live.Moment) -> np.ndarray:
 def choose(objects: Sequence[bpy.types.Object]) -> characters.Chosen:
     """See characters.choosers."""
     choice = result_of(search(bpy.context.scene, objects))
-    return choice.variant.method, choice.variant.all_values, choice.text
+    return choice.variant.method, choice.values, choice.text

@@ -16,6 +16,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...base.phrases import Phrase, phrase
+from ...skinning.parameters import Value
 from ...skinning.variants import Variant
 from ..measure.metrics import Measured
 from ..measure.suggestion import LONGEST, TEARS
@@ -81,6 +82,12 @@ class Choice:
 
     variant: Variant
     why: tuple[Phrase, ...] = ()
+
+    @property
+    def values(self) -> dict[str, Value]:
+        """Of every stage, by full names. The method keeps its parameters, with which it was measured."""
+        own, values = f"{self.variant.method}.", self.variant.all_values
+        return {name: value for name, value in values.items() if not name.startswith(own)}
 
     @property
     def text(self) -> Phrase:

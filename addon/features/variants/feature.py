@@ -5,7 +5,7 @@ from dataclasses import replace
 
 import bpy
 
-from ...attach import variant_settings
+from ...attach import properties, variant_settings
 from ...attach.feature import Feature
 from ...base.errors import SinewError, WrongUse
 from ...deform import session
@@ -62,12 +62,20 @@ class SINEW_OT_use_variant(OnSinewObjects, bpy.types.Operator):
         if variant.method == FILE:
             raise SinewError("The character is as in the file already")
         if variant.method in PRESETS:
-            done = bpy.ops.sinew.recommend("INVOKE_DEFAULT")
-            # In a window it goes on, as an undo step of its own.
-            return {"CANCELLED"} if "RUNNING_MODAL" in done else set(done)
+            return self._use_preset(context)
         with session.changing(context):
             variant_settings.use(character.followers(context), variant)
         return None
+
+    @staticmethod
+    def _use_preset(context: bpy.types.Context) -> set[str]:
+        off = [obj for obj in character.followers(context) if not properties.of(obj).enabled]
+        with session.changing(context):
+            for obj in off:
+                properties.of(obj).enabled = True
+        done = bpy.ops.sinew.recommend("INVOKE_DEFAULT")
+        # In a window it goes on, as an undo step of its own.
+        return {"CANCELLED"} if "RUNNING_MODAL" in done and not off else {"FINISHED"}
 
 
 class SINEW_OT_edit_variant(OnSinewObjects, bpy.types.Operator):

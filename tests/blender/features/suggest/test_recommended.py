@@ -15,11 +15,15 @@ from conftest import REPOSITORY
 from program import run_sinew
 from sinew_addon.attach import properties, stage_settings
 from sinew_addon.base.steps import result_of
+from sinew_addon.deform import characters
 from sinew_addon.features.measure import battery
 from sinew_addon.features.suggest import recommend
+from sinew_addon.skinning.variants import parse
 from whole_file import assert_same, content
 
 pytestmark = pytest.mark.long_term
+
+OTHER_SIGNS = "hierarchy"
 
 
 def arm(degrees: float, axis: int, **options: object) -> tuple[bpy.types.Object, bpy.types.Object]:
@@ -123,6 +127,38 @@ def test_add_takes_it_as_a_choice():
     assert properties.has_sinew(obj)
     assert (properties.of(obj).method, stages_on(obj)) != ("lbs", [])
     assert armature.animation_data.action is not None
+
+
+@pytest.fixture
+def with_own_signs():
+    """An arm that gets dq, with a parameter of dq that differs from its default."""
+    obj, _armature = arm(150.0, axis=0, sides=16, rings=41)
+    properties.of(obj).dq.signs = OTHER_SIGNS
+    return obj
+
+
+def test_parameters_of_the_method_stay(with_own_signs, tmp_path):
+    obj, path = with_own_signs, scenes.save(tmp_path / "arm.blend")
+    bpy.ops.sinew.recommend()
+    settings = properties.of(obj)
+    assert (settings.method, settings.dq.signs) == ("dq", OTHER_SIGNS)
+    options = ("--frames", "none", "--no-pictures")
+    run_sinew("reskin", path, "--out", tmp_path / "out", "--preset", "recommended", *options)
+    settings = stored_in(tmp_path / "out" / "arm.blend")
+    assert (settings.method, settings.dq.signs) == ("dq", OTHER_SIGNS)
+
+
+def test_a_comparison_of_variants_has_the_parameters_of_the_method(with_own_signs):
+    """Another variant of the same method takes nothing from what is chosen."""
+    obj = with_own_signs
+    whole = {name: {obj: parse(name)} for name in ("recommended", "dq")}
+    chosen = characters.with_presets(whole["recommended"])[obj]
+    assert (chosen.method, dict(chosen.values)["dq.signs"]) == ("dq", OTHER_SIGNS)
+    assert characters.with_presets(whole["dq"])[obj] == parse("dq")
+    with characters.kept_choices([obj], ["recommended"], {"A=dq": whole["dq"]}):
+        for name, signs in (("A=dq", "blender"), ("recommended", OTHER_SIGNS)):
+            characters.use_method_on([obj], name)
+            assert (properties.of(obj).method, properties.of(obj).dq.signs) == ("dq", signs)
 
 
 def test_limits_are_read_as_armatures_have_them():

@@ -26,6 +26,7 @@ EDITS = {
     "use": ("use_variant", {"variant": "A=lbs+delta_mush:iterations=9+scale_rule=4.0+normals=LEAVE"}),
     "use the modifier": ("use_variant", {"variant": "As Blender=blender"}),
     "use Recommended": ("use_variant", {"variant": "recommended"}),
+    "use Recommended when off": ("use_variant", {"variant": "recommended"}),
 }
 
 
@@ -49,6 +50,8 @@ def test_one_step(what):
     properties.of(obj).method = "cor"
     bpy.ops.sinew.add_variant(name="B")
     properties.of(obj).twist_spread.enabled = True
+    if what == "use Recommended when off":
+        properties.of(obj).enabled = False
     before = state(obj)
     content = whole_file.content()
     bpy.ops.ed.undo_push(message="before")
@@ -57,6 +60,7 @@ def test_one_step(what):
     assert getattr(bpy.ops.sinew, name)("EXEC_DEFAULT", True, **values) == {"FINISHED"}
     after = state(bpy.data.objects["Arm"])
     assert after[:2] != before[:2]
+    assert properties.of(bpy.data.objects["Arm"]).enabled == (what != "use the modifier")
     bpy.ops.ed.undo()
     assert_state(before)
     whole_file.assert_same(content, whole_file.BY_UNDO)
