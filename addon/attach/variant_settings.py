@@ -27,7 +27,7 @@ def use(objects: Iterable[bpy.types.Object], variant: Variant) -> None:
     """Sets a method with its stages, or the Armature modifier, on objects that have Sinew. The caller has
     them deformed."""
     if variant.method != BLENDER:
-        use_values(objects, variant.method, variant.all_values | variant.settings)
+        use_values(objects, variant.method, variant.assignments)
         return
     for obj in objects:
         property_groups.assign(properties.of(obj), "enabled", False)

@@ -150,37 +150,30 @@ def kept_choices(
     presets = [name for name in names if name in choosers]
     try:
         for name in presets:
-            found, values, failed = _with_presets([(obj, name) for obj in meshes], {})
+            found, set_by, failed = _with_presets([(obj, name) for obj in meshes], {})
             for error in failed.values():
                 raise error
             chosen[name] = {
-                obj: (method, variant_settings.with_parameters(obj, method, values[obj]))
+                obj: (method, variant_settings.with_parameters(obj, method, set_by[obj]))
                 for obj, method in found
             }
         for key, of_meshes in variants.items():
+            own = {obj: of_meshes[obj] for obj in meshes}
             chosen[key] = {
-                obj: chosen.get(of_meshes[obj].method, {}).get(obj) or _as_values(of_meshes[obj])
-                for obj in meshes
+                obj: chosen.get(variant.method, {}).get(obj) or (variant.method, variant.assignments)
+                for obj, variant in own.items()
             }
         for name, of_objects in chosen.items():
-            for obj, (_method, own) in of_objects.items():
-                keyed = setting_animation.keyed(obj, own)
+            for obj, (_method, values) in of_objects.items():
+                keyed = setting_animation.keyed(obj, values)
                 if keyed:
                     raise SinewError(f"{obj.name}: {keyed} is keyed; {name} can not be compared with it")
-                # The first that sets it is before any has.
-                _own.setdefault(obj, {})
-                _own[obj] |= {
-                    each: variant_settings.stored(obj, each) for each in own if each not in _own[obj]
-                }
+                _own.setdefault(obj, {}).update({each: variant_settings.stored(obj, each) for each in values})
         _kept.update(chosen)
         yield
     finally:
         _kept.clear()
         _own.clear()
-
-
-def _as_values(variant: Variant) -> tuple[str, Mapping[str, Value]]:
-    return variant.method, variant.all_values | variant.settings
 
 
 def own_variants(meshes: Sequence[bpy.types.Object], variant: Variant) -> dict[bpy.types.Object, Variant]:

@@ -129,6 +129,11 @@ class Variant:
         return found
 
     @property
+    def assignments(self) -> dict[str, Value]:
+        """All that using it sets: all_values, and those of SETTINGS that it sets."""
+        return self.all_values | self.settings
+
+    @property
     def stage_values(self) -> StageValues:
         """Of the stages that follow the blend; lengths as they are written."""
         found: dict[str, dict[str, Value]] = {name: {} for name in self.stages if name != "mix"}

@@ -95,11 +95,11 @@ def rig(bones):
     return replace(made, segments=np.ones(count, np.int32), first_joints=first, parents=parents)
 
 
-def figure(naming="rigify", limbs=LIMBS):
+def figure(naming="rigify", limbs=LIMBS, trunk=TRUNK):
     """Returns the bones, and the number of each by its plain name and side."""
     made, plain = {}, {}
     for side, sign in (("", 1), ("L", 1), ("R", -1)):
-        for name, (parent, head, tail) in (limbs if side else TRUNK).items():
+        for name, (parent, head, tail) in (limbs if side else trunk).items():
             own = named(naming, name, side)
             mirrored = [tuple(np.multiply(point, (sign, 1, 1))) for point in (head, tail)]
             above = named(naming, parent, side if parent in LIMBS else "") if parent else ""

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import bpy
 
-from ...attach import properties, stage_settings
+from ...attach import node_group, properties, stage_settings
 from ...base.errors import SinewError
 from ...base.output import remove, unfinished_path, writing
 from ...deform import characters
@@ -159,21 +159,19 @@ def carried_by(meshes: list[bpy.types.Object]) -> list[bpy.types.Object]:
 def _without_own_groups(meshes: list[bpy.types.Object]) -> Iterator[None]:
     """Context in which the final meshes lack the vertex groups of stages, which Alembic has with all others
     from 5.3 on."""
-    added, trees = [], []
+    added = []
     for obj in meshes:
         bones = {bone.name for armature in properties.of(obj).armatures for bone in armature.data.bones}
         names = set(stage_settings.vertex_groups(properties.of(obj)).values()) & set(obj.vertex_groups.keys())
         if names - bones:
             modifier = obj.modifiers.new("Sinew Groups", "NODES")
             modifier.node_group = _removing(sorted(names - bones))
-            added.append((obj, modifier))
-            trees.append(modifier.node_group)
+            added.append((obj, modifier, modifier.node_group))
     try:
         yield
     finally:
-        for obj, modifier in added:
+        for obj, modifier, tree in added:
             obj.modifiers.remove(modifier)
-        for tree in trees:
             bpy.data.node_groups.remove(tree)
 
 
@@ -182,13 +180,10 @@ def _removing(names: list[str]) -> bpy.types.NodeTree:
     tree = bpy.data.node_groups.new("Sinew Groups", "GeometryNodeTree")
     for direction in ("INPUT", "OUTPUT"):
         tree.interface.new_socket("Geometry", in_out=direction, socket_type="NodeSocketGeometry")
-    last = tree.nodes.new("NodeGroupInput").outputs[0]
+    last = node_group.add(tree, "NodeGroupInput").outputs[0]
     for name in names:
-        node = tree.nodes.new("GeometryNodeRemoveAttribute")
-        node.inputs["Name"].default_value = name
-        tree.links.new(last, node.inputs["Geometry"])
-        last = node.outputs["Geometry"]
-    tree.links.new(last, tree.nodes.new("NodeGroupOutput").inputs[0])
+        last = node_group.add(tree, "GeometryNodeRemoveAttribute", {"Geometry": last, "Name": name})
+    node_group.add(tree, "NodeGroupOutput", {"Geometry": last})
     return tree
 
 

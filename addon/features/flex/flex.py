@@ -6,45 +6,30 @@ from __future__ import annotations
 
 from collections.abc import Callable, Generator, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cached_property, partial
+from functools import partial
 
 import bpy
 import numpy as np
 
 from ...attach import properties
 from ...base.errors import SinewError
-from ...io import armature_io
 from ...skinning.rig import Bones
 from ..measure import battery, live
-from ..measure.battery import Battery
 from ..measure.crossings import crossing_triangles
 from ..measure.measured_on import OWN as OWN_METHOD
 from ..measure.measured_on import MeasuredOn
 from ..measure.metrics import FrameOfRig
+from ..measure.rigs import Rig, posed
 from .character import Character, Skeleton
 from .limits import Table
 from .verdict import OWN, Pose, Verdict, judge
 
 
 @dataclass
-class _Rig:
-    """An armature, and the meshes that it deforms.
+class _Rig(Rig):
+    """first: the number of its first bone in the skeleton"""
 
-    first   the number of its first bone in the skeleton
-    moving  names of the bones that move vertices
-    world   float64 [4, 4]
-    """
-
-    armature: bpy.types.Object
-    bones: Bones
-    first: int
-    moving: set[str]
-    world: np.ndarray
-
-    @cached_property
-    def battery(self) -> Battery:
-        moving = np.array([name in self.moving for name in self.bones.names], bool)
-        return Battery(self.bones, armature_io.read_limits(self.armature), moving)
+    first: int = 0
 
     def rest(self) -> np.ndarray:
         return self.world @ self.bones.rest[: len(self.bones.names)].astype(np.float64)
@@ -125,7 +110,7 @@ def _rigs(now: live.Moment) -> list[_Rig]:
         if armature is None:
             raise SinewError(f"{part.obj.name}: its armature is missing")
         if armature.session_uid not in found:
-            found[armature.session_uid] = _Rig(armature, deformer.bones, first, set(), world)
+            found[armature.session_uid] = _Rig(armature, deformer.bones, world, first=first)
             first += len(deformer.bones.names)
         else:
             rig = found[armature.session_uid]
@@ -185,7 +170,4 @@ def _poses(rigs: Sequence[_Rig], table: Table) -> Iterator[tuple[_Rig, tuple[int
 
 
 def _posed(now: live.Moment, bones: Bones, pose: battery.Pose, own: Sequence[str | None]) -> _Posed:
-    def matrices(of: Bones) -> np.ndarray:
-        return battery.posed(of, pose) if of is bones or of.names == bones.names else of.rest
-
-    return _Posed(now.posed(matrices), own)
+    return _Posed(posed(now, {bones.names: pose}), own)

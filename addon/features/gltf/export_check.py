@@ -359,16 +359,16 @@ class Comparison:
 def shears(poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
     """float [bones]: the largest cosine between two axes of each, relative to its parent. As of
     damaged_bones()."""
-    axes = _axes(poses, parents)
+    axes = relative(poses, parents)[:, :3, :3]
     sizes = np.linalg.norm(axes, axis=1)
     products = axes.transpose(0, 2, 1) @ axes / np.maximum(sizes[:, :, None] * sizes[:, None], 1e-30)
     return np.abs(products * (1.0 - np.identity(3))).max(axis=(1, 2), initial=0.0)
 
 
-def _axes(poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
-    """float64 [bones, 3, 3], relative to their parents."""
+def relative(poses: np.ndarray, parents: np.ndarray) -> np.ndarray:
+    """float64 [bones, 4, 4], relative to their parents. As of damaged_bones()."""
     above = np.where(parents[:, None, None] >= 0, poses[parents], np.identity(4))
-    return (np.linalg.pinv(above) @ poses)[:, :3, :3]
+    return np.linalg.pinv(above) @ poses
 
 
 def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarray:
@@ -380,7 +380,7 @@ def damaged_bones(poses: np.ndarray, parents: np.ndarray, kind: str) -> np.ndarr
     parents  int [bones], -1 for none
     kind     the ending of the file
     """
-    axes = _axes(poses, parents)
+    axes = relative(poses, parents)[:, :3, :3]
     sizes = np.linalg.norm(axes, axis=1)
     sheared = (shears(poses, parents) > 1e-5) | (sizes < 1e-6).any(axis=1)
     rounded = np.zeros(len(poses), dtype=bool)

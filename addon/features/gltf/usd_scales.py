@@ -16,7 +16,7 @@ import bpy
 import numpy as np
 
 from ...io import armature_io
-from .export_check import plain
+from .export_check import plain, relative
 
 # Nearer samples than this are left out by Blender's exporter; a distance that is worth a word.
 _LEFT_OUT, _SMALL = 0.01, 0.001
@@ -48,10 +48,9 @@ class Scales:
             evaluated = rig.evaluated_get(depsgraph)
             bones = armature_io.read_bones(evaluated)
             posed = armature_io.read_pose(evaluated, bones)[: len(bones.names)].astype(np.float64)
-            above = np.where(bones.parents[:, None, None] >= 0, posed[bones.parents], np.identity(4))
             self.names[rig.name] = list(bones.names)
             own = self.poses.setdefault(rig.name, {})
-            own[scene.frame_current_final] = np.linalg.pinv(above) @ posed
+            own[scene.frame_current_final] = relative(posed, bones.parents)
 
     def write(self, path: Path) -> list[str]:
         """Writes all samples again of the armatures that the file has. Returns a sentence for each whose

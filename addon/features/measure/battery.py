@@ -228,6 +228,10 @@ class Battery:
         found += self._general(free)
         return [pose for pose in found if pose.rotations]
 
+    def pose_of(self, name: str, moves: Sequence[Move]) -> Pose:
+        """One that a figure does, by all joints, whatever their limits are."""
+        return Pose(name, dict(self._moved(moves, self._joints)))
+
     def combined(self) -> list[Pose]:
         """Those poses of figures that bend several joints at once."""
         return [pose for pose in self.poses() if pose.name in COMBINED]

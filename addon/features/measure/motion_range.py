@@ -9,30 +9,26 @@ from typing import NamedTuple
 import numpy as np
 
 from ...skinning.rig import Bones
-from .battery import Battery, Limits, Move, Pose, sides
+from .battery import FIGURE, Battery, Limits, Move, Pose, sides
 
 RANGE: Mapping[str, tuple[Move, ...]] = {
-    "Elbows bent": (Move("forearm", "bend", 130.0),),
-    "Wrists twisted": (Move("hand", "twist", 150.0),),
+    "Elbows bent": FIGURE["Elbows bent"],
+    "Wrists twisted": FIGURE["Wrists twisted"],
     "Wrists twisted back": (Move("hand", "twist", -150.0),),
-    "Wrists bent": (Move("hand", "bend", 70.0, "in"),),
-    "Arms raised": (Move("upper_arm", "aim", 150.0, "out"),),
+    "Wrists bent": FIGURE["Wrists bent"],
+    "Arms raised": FIGURE["Arms raised"],
     "Arms across": (Move("upper_arm", "aim", 90.0, "across"),),
-    "Squat": (
-        Move("thigh", "aim", 100.0, "front"),
-        Move("shin", "bend", 120.0, "back"),
-        Move("foot", "bend", 25.0, "up"),
-    ),
+    "Squat": FIGURE["Squat"],
     "Legs back": (Move("thigh", "aim", 30.0, "back"),),
-    "Legs apart": (Move("thigh", "aim", 60.0, "out"),),
+    "Legs apart": FIGURE["Legs apart"],
     "Knees bent": (Move("shin", "bend", 130.0, "back"),),
     "Feet bent": (Move("foot", "bend", 25.0, "up"),),
     "Feet stretched": (Move("foot", "open", 45.0, "up"),),
     "Neck turned": (Move("neck", "turn", 70.0, shared=True),),
     "Neck bowed": (Move("neck", "bend", 50.0, shared=True),),
-    "Back bent": (Move("spine", "bend", 60.0, shared=True),),
-    "Back turned": (Move("spine", "turn", 60.0, shared=True),),
-    "Fists": (Move("finger", "bend", 75.0, "in"), Move("thumb", "bend", 35.0)),
+    "Back bent": FIGURE["Back bent"],
+    "Back turned": FIGURE["Back turned"],
+    "Fists": FIGURE["Fists"],
 }
 """Of a figure that stands upright; angles in degrees."""
 
@@ -44,8 +40,8 @@ COLUMNS = {
     "Squat": "Hip",
     "Knees bent": "Knee",
     "Neck turned": "Neck",
-    "Fists": "Fingers",
     "Back bent": "Spine",
+    "Fists": "Fingers",
 }
 # What else is done, so that the joint is seen.
 _ARMS_UP = (Move("upper_arm", "aim", 160.0, "out"),)
@@ -82,26 +78,22 @@ def columns(bones: Bones, moving: np.ndarray) -> list[Column]:
     other rigs each joint is a column, bent about its first axis; of mirrored ones the left."""
     battery, (side, mirror) = Battery(bones, {}, moving), sides(bones.names)
     if not battery.is_figure:
-        swing = {role: (Move(role, "swing", SWING),) for role in ("other",)}
         found: dict[int, Column] = {}
-        for bone, pose in battery.of_joints(swing):
+        for bone, pose in battery.of_joints({"other": (Move("other", "swing", SWING),)}):
             if side[bone] >= 0 or mirror[bone] < 0:
                 found.setdefault(bone, Column(bones.names[bone], pose, (bone,)))
         return list(found.values())
     roles, taken = battery.roles(), []
-    for pose in battery.poses(RANGE):
-        joint = COLUMNS.get(pose.name)
-        if joint is None:
-            continue
-        kept = next(
-            own
-            for sign in (1, -1)
-            if (own := {b: r for b, r in pose.rotations.items() if side[b] in (0, sign)}) or sign < 0
-        )
-        looked_at = RANGE[pose.name][0].role
-        aside = battery.poses({pose.name: ASIDE.get(pose.name, ())})
-        kept |= aside[0].rotations if aside else {}
-        own_bones = tuple(bone for bone in kept if roles[bone] == looked_at)
-        if own_bones:
-            taken.append(Column(joint, Pose(pose.name, kept), own_bones))
+    for name, joint in COLUMNS.items():
+        rotations = _of_one_side(battery.pose_of(name, RANGE[name]).rotations, side)
+        own = tuple(bone for bone in rotations if roles[bone] == RANGE[name][0].role)
+        if own:
+            aside = battery.pose_of(name, ASIDE.get(name, ())).rotations
+            taken.append(Column(joint, Pose(name, rotations | aside), own))
     return taken
+
+
+def _of_one_side(rotations: Mapping[int, np.ndarray], side: np.ndarray) -> dict[int, np.ndarray]:
+    """Returns those of the left side, or of the right where there is no left; and of neither."""
+    of_sides = ({b: r for b, r in rotations.items() if side[b] in (0, sign)} for sign in (1, -1))
+    return next(filter(None, of_sides), {})

@@ -5,11 +5,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import bpy
 import numpy as np
 
 from ...attach import attach
+from ...io import armature_io
 from ...skinning.rig import Bones
 from . import battery
 from .live import Moment
@@ -32,6 +34,11 @@ class Rig:
     def is_moving(self) -> np.ndarray:
         """bool [bones]"""
         return np.array([name in self.moving for name in self.bones.names], bool)
+
+    @cached_property
+    def battery(self) -> battery.Battery:
+        """Within the limits that its bones have."""
+        return battery.Battery(self.bones, armature_io.read_limits(self.armature), self.is_moving)
 
 
 def rigs_of(now: Moment) -> list[Rig]:

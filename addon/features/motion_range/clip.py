@@ -9,16 +9,15 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 
 import bpy
 import numpy as np
-from mathutils import Matrix
 
 from ...attach import properties
 from ...base.errors import SinewError
 from ...deform import session
-from ...io import actions, armature_io, pose_io
+from ...io import actions, armature_io, pose_io, spaces
 from ...io.poses import Poses
 from ...skinning.rig import Bones
 from ..measure import battery, motion_range
@@ -163,32 +162,15 @@ def _channels(armature: bpy.types.Object, bones: Bones, poses: Sequence[battery.
     near[modes == "QUATERNION", 3] = 1.0
     near[modes == "AXIS_ANGLE", 5] = 1.0
     found = [pose_io.channels_of(at_rest, modes, near)]
-    for pose in poses:
-        rigid, scale = np.zeros((count, 7)), np.ones((count, 3))
-        for row, basis in enumerate(_bases(armature, battery.posed(bones, pose))):
+    posed = [battery.posed(bones, pose) for pose in poses]
+    rigid = np.zeros((len(poses), count, 7))
+    for row, (pose_bone, above) in enumerate(zip(armature.pose.bones, bones.parents, strict=True)):
+        own, parent = ([pose[bone] for pose in posed] for bone in (row, above))
+        for number, basis in enumerate(spaces.channels_from_poses(pose_bone.bone, own, parent)):
             location, rotation, _scale = basis.decompose()
-            rigid[row] = (*rotation, *location)
-        found.append(pose_io.channels_of(Poses(rigid, scale), modes, found[0]))
+            rigid[number, row] = (*rotation, *location)
+    found += [pose_io.channels_of(Poses(each, np.ones((count, 3))), modes, found[0]) for each in rigid]
     return np.array(found)
-
-
-def _bases(armature: bpy.types.Object, posed: np.ndarray) -> Iterator[Matrix]:
-    """What poses each bone so, relative to its parent.
-
-    posed  [bones or more, 4, 4], armature space
-    """
-    targets = {
-        bone.name: Matrix(matrix.tolist()) for bone, matrix in zip(armature.pose.bones, posed, strict=False)
-    }
-    for pose_bone in armature.pose.bones:
-        bone = pose_bone.bone
-        above = {}
-        if bone.parent is not None:
-            above = {
-                "parent_matrix": targets[bone.parent.name],
-                "parent_matrix_local": bone.parent.matrix_local,
-            }
-        yield bone.convert_local_to_pose(targets[bone.name], bone.matrix_local, invert=True, **above)
 
 
 def _state(scene: bpy.types.Scene, armature: bpy.types.Object) -> dict:

@@ -17,6 +17,7 @@ import sinew
 from ...attach import properties
 from ...base.errors import SinewError
 from ...skinning.variants import Variant
+from ...skinning.vectors import unit
 from ..measure import live, motion_range
 from ..measure.joint_figures import Figures
 from ..measure.motion_range import Column
@@ -65,7 +66,7 @@ class Bent:
         motion = np.identity(4)
         motion[:3, :3] = self.pose.rotations[bone]
         axis = sinew.affine.to_screw(motion).axis
-        axis, limb = (_unit(world @ each) for each in (axis, self._rig.bones.limbs.vectors[bone]))
+        axis, limb = (unit(world @ each) for each in (axis, self._rig.bones.limbs.vectors[bone]))
         return joint_view(points, points[self._is_near()], axis, limb)
 
     @cached_property
@@ -166,7 +167,3 @@ def cells(
             else:
                 pixels = np.zeros((size, size, 4), np.float32)
             yield Cell(row, column, pixels, figures)
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)

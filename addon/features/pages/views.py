@@ -6,6 +6,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...skinning.vectors import unit
+
 # A little from the character's left and from above, relative to Blender's front view (-Y).
 VIEW_DIRECTION = np.array([0.45, -1.0, 0.22]) / np.linalg.norm([0.45, -1.0, 0.22])
 # The share of the mesh's diagonal that close-ups show.
@@ -93,7 +95,7 @@ def joint_view(points: np.ndarray, targets: np.ndarray, axis: np.ndarray, limb: 
         sides = [np.cos(angle) * right + np.sin(angle) * up for angle in angles]
     else:
         # A little of its depth is seen, too.
-        sides = [_unit(sign * axis + TILT * VIEW_DIRECTION) for sign in (1.0, -1.0)]
+        sides = [unit(sign * axis + TILT * VIEW_DIRECTION) for sign in (1.0, -1.0)]
     direction = _clearest(points - centre, radius, sides, HIDES)
     seen = targets @ np.stack([*camera_axes(direction), direction], axis=1)
     low, high = seen.min(axis=0), seen.max(axis=0)
@@ -132,10 +134,6 @@ def _clearest(
         return float(count // max(alike * len(points), 1.0))
 
     return min(candidates, key=lambda direction: (hidden(direction), -float(direction @ VIEW_DIRECTION)))
-
-
-def _unit(vector: np.ndarray) -> np.ndarray:
-    return vector / max(float(np.linalg.norm(vector)), 1e-12)
 
 
 def camera_axes(direction: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,7 +14,6 @@ from ...base.errors import SinewError
 from ...base.phrases import phrase
 from ...base.steps import as_part, result_of
 from ...deform import characters
-from ...io import armature_io
 from ...skinning.variants import Variant
 from ...ui import stepped
 from ..measure import battery, live
@@ -109,12 +108,7 @@ def _crossings(moment: live.Moment, points: np.ndarray) -> set[tuple[int, int]]:
 
 def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
     """Returns the poses of the battery, by their names. Several armatures are posed at the same time."""
-    found = {
-        rig.bones.names: battery.Battery(
-            rig.bones, armature_io.read_limits(rig.armature), rig.is_moving
-        ).poses()
-        for rig in rigs_of(now)
-    }
+    found = {rig.bones.names: rig.battery.poses() for rig in rigs_of(now)}
     longest = max(found.values(), key=len, default=[])
     return [
         (name, posed(now, {names: own[number] for names, own in found.items() if number < len(own)}))

@@ -18,6 +18,7 @@ from sinew_addon.base.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.measure import battery
 from sinew_addon.features.suggest import recommend
+from sinew_addon.io import armature_io
 from sinew_addon.skinning.variants import parse
 from whole_file import assert_same, content
 
@@ -168,7 +169,7 @@ def test_limits_are_read_as_armatures_have_them():
     bone.lock_ik_y = True
     limit = armature.pose.bones[0].constraints.new("LIMIT_ROTATION")
     limit.owner_space, limit.use_limit_z, limit.max_z = "LOCAL", True, 1.0
-    limits = recommend.armature_io.read_limits(armature)
+    limits = armature_io.read_limits(armature)
     np.testing.assert_allclose(limits["bone.1"][:2], [[-0.5, 2.0], [0.0, 0.0]], atol=1e-6)
     np.testing.assert_allclose(limits["bone.0"][2], [0.0, 1.0], atol=1e-6)
     assert np.isnan([limits["bone.1"][2], limits["bone.0"][0]]).all()

@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 import pytest
-from figures import NAMES, figure
+from figures import NAMES, TRUNK, figure
 from sinew_addon.features.measure import battery, motion_range
 
 
@@ -66,3 +66,16 @@ def test_columns_bend_one_side(naming):
     assert number["thigh", "R"] not in by_joint["Hip"].pose.rotations
     # The arms are out of the way.
     assert {number["upper_arm", side] for side in "LR"} <= set(by_joint["Hip"].pose.rotations)
+
+
+def test_columns_leave_other_bones():
+    """A tail, which has no role, stays."""
+    tail = {
+        "tail": ("hips", (0, 0.1, 1.0), (0, 0.4, 1.0)),
+        "tail_tip": ("tail", (0, 0.4, 1.0), (0, 0.7, 1.0)),
+    }
+    bones, number = figure("unreal", trunk={**TRUNK, **tail})
+    columns = motion_range.columns(bones, np.ones(len(bones.names), bool))
+    assert len(columns) == 8
+    tails = {number[name, ""] for name in tail}
+    assert not any(tails & set(each.pose.rotations) for each in columns)
