@@ -508,6 +508,15 @@ def site(words: list[str]) -> int:
     return 0
 
 
+def findings(words: list[str]) -> int:
+    """Runs scripts of findings/, each to its end, and says at last which saw something else."""
+    known = {path.stem: path for path in sorted(Path("findings").glob("*.sh"))}
+    if unknown := [word for word in words if word not in known]:
+        sys.exit(f"dev: no finding {unknown[0]}: {', '.join(known)}")
+    changed = [name for name in words or known if say(f"finding {name}") or call("bash", known[name])]
+    return 1 if changed and not say(f"changed: {', '.join(changed)}") else 0
+
+
 def stub(words: list[str]) -> int:
     set_up("site")
     return call(f"{python_in('site')} tools/make_stub.py", *words)
@@ -564,6 +573,7 @@ PROGRAMS = {
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     **{name: functools.partial(in_blender, program=program) for name, program in PROGRAMS.items()},
     **{"demo": demo, "test": test, "bench": bench, "report": report, "site": site, "stub": stub},
+    "findings": findings,
     **{"lint": lint, "package": package_command, "wheel": wheel},
     "release": lambda words: call(f"{sys.executable} -I tools/release.py", *words),
     "lock": lambda words: call(f"{sys.executable} tools/lock.py", *words),

@@ -25,7 +25,7 @@ from ..bake.bake_export import TEXTURES_STAY
 from ..bake.baked_files import is_whole
 from ..bake.segment_bones import SegmentReport
 from . import engine_weights, export, usd_scales, verify
-from .export_check import FRAMES, Check, ExportOptions, spread_frames
+from .export_check import FRAMES, Check, ExportOptions, plain, spread_frames
 
 # What the add-on for VRM writes of a vertex.
 _VRM_INFLUENCES = 4
@@ -73,6 +73,8 @@ def write(
     )
     left_out += engine_weights.prepare(skinned, kind)
     rigs = {properties.of(obj).armature.name for obj in skinned}
+    if kind == ".usdc":
+        _check_names(sorted(rigs))
     if is_gltf:
         scene.sinew_gltf.skinning = True
     else:
@@ -101,6 +103,20 @@ def write(
     if is_gltf:
         left_out += export.current.left_out
     return Written(bendy, checks, left_out)
+
+
+def _check_names(rigs: list[str]) -> None:
+    """Raises SinewError for bones that USD can not tell apart: all joints are lost then, with no word of the
+    exporter's."""
+    for rig in rigs:
+        known: dict[tuple[str, str], str] = {}
+        for bone in bpy.data.objects[rig].data.bones:
+            other = known.setdefault((bone.parent.name if bone.parent else "", plain(bone.name)), bone.name)
+            if other != bone.name:
+                raise SinewError(
+                    f"{rig}: the bones {other} and {bone.name} have one name in USD, where only letters, digits "
+                    "and underscores count; rename one"
+                )
 
 
 def mirrored(skinned: list[bpy.types.Object]) -> list[str]:

@@ -386,6 +386,27 @@ def test_a_mirrored_bone_in_usd(scene, tmp_path, method, scale):
     assert said == (method == "dq" and scale < 0.0)
 
 
+def test_two_bones_of_one_name_in_usd(scene, tmp_path):
+    """The exporter would write a skeleton that nobody can read, and say nothing."""
+    _obj, armature = scene
+    armature.data.bones[0].name, armature.data.bones[1].name = "arm.L", "arm_L"
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out")
+    # Of different parents, their paths differ.
+    run_sinew(*words, tmp_path / "arm.usdc")
+    (tmp_path / "arm.usdc").unlink()
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones["arm_L"].parent = None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    scenes.save(tmp_path / "arm.blend")
+    said = program.complaint(run_sinew(*words, tmp_path / "arm.usdc", status=1).stderr)
+    assert said.endswith("rename one")
+    assert "arm.L and arm_L" in said
+    assert not (tmp_path / "arm.usdc").exists()
+    run_sinew(*words, tmp_path / "arm.glb")
+
+
 def test_more_than_four_influences(scene, tmp_path):
     scenes.save(tmp_path / "arm.blend")
     words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out")
