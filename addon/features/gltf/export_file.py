@@ -114,8 +114,8 @@ def _check_names(rigs: list[str]) -> None:
             other = known.setdefault((bone.parent.name if bone.parent else "", plain(bone.name)), bone.name)
             if other != bone.name:
                 raise SinewError(
-                    f"{rig}: the bones {other} and {bone.name} have one name in USD, where only letters, digits "
-                    "and underscores count; rename one"
+                    f"{rig}: the bones {other} and {bone.name} have one name in USD, where only letters, "
+                    "digits and underscores count; rename one"
                 )
 
 
