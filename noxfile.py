@@ -513,6 +513,8 @@ def findings(words: list[str]) -> int:
     known = {path.stem: path for path in sorted(Path("findings").glob("*.sh"))}
     if unknown := [word for word in words if word not in known]:
         sys.exit(f"dev: no finding {unknown[0]}: {', '.join(known)}")
+    pythons = [Path(python).parent for python in map(python_of, WHEEL_PYTHONS) if python]
+    os.environ["PATH"] = ":".join(map(str, (*pythons, os.environ["PATH"])))
     changed = [name for name in words or known if say(f"finding {name}") or call("bash", known[name])]
     return 1 if changed and not say(f"changed: {', '.join(changed)}") else 0
 

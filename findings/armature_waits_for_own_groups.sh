@@ -19,7 +19,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3.11 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet bpy==4.5.15
-cat >"$folder/waits.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import bpy
 
 
@@ -61,5 +61,5 @@ seen = {group: moved(group) for group in ("", "x", "b")}
 print(bpy.app.version_string, seen)
 raise SystemExit(seen != {"": False, "x": False, "b": True})
 PYTHON
-"$folder/venv/bin/python" "$folder/waits.py"
+"$folder/venv/bin/python" "$folder/shown.py"
 echo "as seen on 2026-11-29"

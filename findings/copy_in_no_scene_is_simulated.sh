@@ -16,7 +16,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3.11 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet bpy==4.5.15
-cat >"$folder/copy.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import bpy
 
 scene = bpy.context.scene
@@ -39,5 +39,5 @@ is_in_world = copy.name in scene.rigidbody_world.collection.objects
 print(bpy.app.version_string, "ball at", height, "copy in the scene:", is_in_scene, "in the world:", is_in_world)
 raise SystemExit((height, is_in_scene, is_in_world) != (1.3, False, True))
 PYTHON
-"$folder/venv/bin/python" "$folder/copy.py"
+"$folder/venv/bin/python" "$folder/shown.py"
 echo "as seen on 2026-11-29"

@@ -17,7 +17,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3.13 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet bpy==5.3.0
-cat >"$folder/driver.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import tempfile
 from pathlib import Path
 
@@ -52,5 +52,5 @@ bpy.app.driver_namespace.clear()
 print(bpy.app.version_string, seen)
 raise SystemExit(seen != {"first": [4, 0, 0, 0], "opened again": [0, 0], "assigned": [6, 7]})
 PYTHON
-"$folder/venv/bin/python" "$folder/driver.py"
+"$folder/venv/bin/python" "$folder/shown.py"
 echo "as seen on 2026-11-29"

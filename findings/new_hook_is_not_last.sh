@@ -13,7 +13,7 @@
 set -euo pipefail
 folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
-cat >"$folder/hook.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import bpy
 
 
@@ -32,6 +32,6 @@ PYTHON
 for pair in 3.11:4.5.15 3.13:5.3.0; do
     "python${pair%%:*}" -m venv "$folder/${pair##*:}"
     "$folder/${pair##*:}/bin/pip" install --quiet "bpy==${pair##*:}"
-    "$folder/${pair##*:}/bin/python" "$folder/hook.py"
+    "$folder/${pair##*:}/bin/python" "$folder/shown.py"
 done
 echo "as seen on 2026-11-29"

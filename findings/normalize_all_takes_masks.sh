@@ -17,7 +17,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3.11 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet bpy==4.5.15
-cat >"$folder/normalize.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import bpy
 
 
@@ -51,5 +51,5 @@ seen = weights(False), weights(True)
 print(bpy.app.version_string, *seen)
 raise SystemExit(seen != ([0.333, 0.133, 0.533], [0.714, 0.286, 0.8]))
 PYTHON
-"$folder/venv/bin/python" "$folder/normalize.py"
+"$folder/venv/bin/python" "$folder/shown.py"
 echo "as seen on 2026-11-29"

@@ -16,7 +16,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3.11 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet bpy==4.5.15
-cat >"$folder/joints.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import tempfile
 from pathlib import Path
 
@@ -49,5 +49,5 @@ bones = [bone.name for armature in bpy.data.armatures for bone in armature.bones
 print(bpy.app.version_string, done, joints, "imported:", bones)
 raise SystemExit((joints, bones) != ('uniform token[] joints = ["arm_L", "arm_L"]', []))
 PYTHON
-"$folder/venv/bin/python" "$folder/joints.py"
+"$folder/venv/bin/python" "$folder/shown.py"
 echo "as seen on 2026-11-29"

@@ -13,7 +13,6 @@ from ..base.output import folder_to_write, write_text
 from ..base.steps import result_of
 from ..features.measure.comparison import USUAL_METHODS, Comparison, RestFacts
 from ..features.measure.diagnostics import USUAL_INFLUENCES
-from ..features.measure.stray_weights import stray_weights
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
@@ -296,6 +295,7 @@ def _measure(
 ) -> Comparison:
     from ..deform import characters
     from ..features.measure import subjects
+    from ..features.measure.stray_weights import stray_weights
 
     methods = list(labels)
     batches = subjects.batches(subject, frames, len(methods) + 1)
@@ -305,6 +305,7 @@ def _measure(
         subjects.measure(subject, methods, args.reference, batch, measured)
         rest = rest or RestFacts.of(subject.gauge)
     assert rest is not None, "there is at least one frame"
+    stray = stray_weights([part.edited for part in subject.parts])
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],
@@ -317,9 +318,7 @@ def _measure(
         measured.times,
         measured.own,
         {
-            part.obj.name: [*stray, *part.edited.findings(args.influences)]
-            for part, stray in zip(
-                subject.parts, stray_weights([p.edited for p in subject.parts]), strict=True
-            )
+            part.obj.name: [*own, *part.edited.findings(args.influences)]
+            for part, own in zip(subject.parts, stray, strict=True)
         },
     )
