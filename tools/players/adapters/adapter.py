@@ -4,20 +4,26 @@
 python PLAYER.py FILE OUT.npz --times 0,0.4 --clip 0 [--still A.glb B.glb]
 
 OUT.npz has `version` and one of these: `rest` and `points`; `outlines`, and those of meshes that stand
-still, `still`; `said`, a sentence, where the player shows no skin.
+still, `still`; `said`, a sentence, where the player shows no skin; `missing`, what this machine lacks.
 """
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+sys.path.append(str(Path(__file__).resolve().parents[1]))
 # The camera of outlines, in glTF's axes: its place, what it looks at, its angle from top to bottom.
 EYE, TARGET, DEGREES, PIXELS = (0.0, 3.0, 24.0), (0.0, 3.0, 0.0), 30.0, 1024
+
+
+class MissingError(Exception):
+    """Of what this machine lacks."""
 
 
 class NoSkinError(Exception):
@@ -71,4 +77,6 @@ def main(version: str, play: Callable[[Task], dict]) -> None:
         found = play(task)
     except NoSkinError as error:
         found = {"said": str(error)}
+    except MissingError as error:
+        found = {"missing": str(error)}
     np.savez(given.out, version=version, **found)
