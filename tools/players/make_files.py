@@ -18,7 +18,7 @@ from glb import Glb
 
 RATE, LAST, FRAMES = 30, 24, (0, 5, 12, 19, 23)
 BONES, RINGS, SIDES = 6, 13, 8
-# Positions are multiples of this, in metres, and weights of a 255th: so files of small integers have them exactly.
+# Positions are multiples of this, in metres, and weights of a 255th: so small integers have them exactly.
 STEP, STEPS = 2.0**-12, 255
 DEGREES, OTHER_DEGREES = 25.0, -10.0
 
@@ -76,7 +76,12 @@ def make_tube(most: int) -> tuple[bpy.types.Object, bpy.types.Object]:
         for angle in angles
     ]
     faces = [
-        (ring * SIDES + k, ring * SIDES + (k + 1) % SIDES, (ring + 1) * SIDES + (k + 1) % SIDES, (ring + 1) * SIDES + k)
+        (
+            ring * SIDES + k,
+            ring * SIDES + (k + 1) % SIDES,
+            (ring + 1) * SIDES + (k + 1) % SIDES,
+            (ring + 1) * SIDES + k,
+        )
         for ring in range(RINGS - 1)
         for k in range(SIDES)
     ]

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Measures what players make of skins: `./dev players`. Blender makes files (make_files.py), each player plays
-them in a process of its own (adapters/), and the distances from what Blender showed are written to
+"""Measures what players make of skins: `./dev players`. Blender makes files (make_files.py), each player
+plays them in a process of its own (adapters/), and the distances from what Blender showed are written to
 addon/features/gltf/players.json and to the table of docs/players.md.
 
 python tools/players/measure.py --bpy VERSION=PYTHON [--bpy ...] [--work FOLDER] [NAME ...]
@@ -136,7 +136,7 @@ def run(row: Row, pythons: dict[str, str], file: Path, made: dict, work: Path) -
     if not out.exists():
         lines = [line.strip() for line in (done.stderr + done.stdout).splitlines() if line.strip()]
         errors = [line for line in lines if "Error" in line] or lines[-1:] or [f"ends by {done.returncode}"]
-        return {"said": f"fails: {errors[-1]}".replace(str(file.parent), "")[:120]}
+        return {"said": errors[-1].replace(f"{file.parent}/", "")[:120]}
     with np.load(out) as arrays:
         found = dict(arrays)
     cell: dict = {"version": str(found["version"])}
@@ -169,11 +169,11 @@ def measured(row: Row, pythons: dict[str, str], files: Path, work: Path) -> Iter
             return
 
 
-def shown(cell: dict | None) -> str:
+def shown(name: str, cell: dict | None) -> str:
     if cell is None:
-        return "–"
+        return ""
     if "said" in cell:
-        return "fails" if cell["said"].startswith("fails") else "no skin"
+        return "no skin" if name == "plain" else "fails"
     distance = cell["distance"]
     text = f"{distance:.2g}"
     if cell.get("outline") and distance < 1.5 * SEEN / 1024:
@@ -187,7 +187,7 @@ def table_of(figures: list[dict]) -> str:
     lines = ["| player | version | date | " + " | ".join(COLUMNS.values()) + " |"]
     lines.append("|---" * (3 + len(COLUMNS)) + "|")
     for row in figures:
-        cells = [shown(row["cells"].get(name)) for name in COLUMNS]
+        cells = [shown(name, row["cells"].get(name)) for name in COLUMNS]
         lines.append("| " + " | ".join([row["label"], row["version"], row["date"], *cells]) + " |")
     said = [
         f"- {row['label']}, {COLUMNS[name]}: {cell['said']}"
@@ -231,7 +231,7 @@ def main() -> None:
             for name, cell in measured(row, pythons, files, work):
                 version = cell.pop("version", version)
                 cells[name] = cell
-                print(f"{row.label}: {COLUMNS[name]}: {shown(cell)} {cell.get('said', '')}", flush=True)
+                print(f"{row.label}: {COLUMNS[name]}: {shown(name, cell)} {cell.get('said', '')}", flush=True)
         except LookupError as error:
             print(f"{row.label}: left as it was, as this needs {error.args[0]}", flush=True)
             continue

@@ -58,8 +58,8 @@ def outline(picture: np.ndarray) -> np.ndarray:
 def blended(
     points: np.ndarray, slots: np.ndarray, weights: np.ndarray, motions: Sequence[np.ndarray]
 ) -> np.ndarray:
-    """float64 [vertices, 3]: linear blending of motions [bones, 4, 4] for players that have bones and weights,
-    and leave the skin to a shader or to who reads the file."""
+    """float64 [vertices, 3]: linear blending of motions [bones, 4, 4], for what reads bones and weights and
+    leaves the skin to others."""
     matrices = np.einsum("vk,vkij->vij", weights, np.asarray(motions)[slots])
     return np.einsum("vij,vj->vi", matrices[:, :3, :3], points) + matrices[:, :3, 3]
 

@@ -34,7 +34,10 @@ def play(task: Task) -> dict:
     number = sorted(range(len(names)), key=lambda k: names[k])[task.clip]
     anim = keep(keep(stacks[number]).anim)
     posed = [keep(ufbx.evaluate_scene(scene, anim, time, evaluate_skinning=True)) for time in task.times]
-    return {"rest": points_of(scene, is_posed=False), "points": [points_of(each, is_posed=True) for each in posed]}
+    return {
+        "rest": points_of(scene, is_posed=False),
+        "points": [points_of(each, is_posed=True) for each in posed],
+    }
 
 
 if __name__ == "__main__":

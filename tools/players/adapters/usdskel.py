@@ -25,10 +25,15 @@ def play(task: Task) -> dict:
     for time in (time * stage.GetTimeCodesPerSecond() for time in task.times):
         points = Vt.Vec3fArray(rest)
         if skinning.HasBlendShapes():
-            weights = skinning.GetBlendShapeMapper().Remap(skeleton.GetAnimQuery().ComputeBlendShapeWeights(time))
+            weights = skinning.GetBlendShapeMapper().Remap(
+                skeleton.GetAnimQuery().ComputeBlendShapeWeights(time)
+            )
             parts = blending.ComputeSubShapeWeights(weights)
             blending.ComputeDeformedPoints(
-                *parts, blending.ComputeBlendShapePointIndices(), blending.ComputeSubShapePointOffsets(), points
+                *parts,
+                blending.ComputeBlendShapePointIndices(),
+                blending.ComputeSubShapePointOffsets(),
+                points,
             )
         skinning.ComputeSkinnedPoints(skeleton.ComputeSkinningTransforms(time), points, time)
         # In the space of the skeleton.
