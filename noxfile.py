@@ -171,7 +171,7 @@ ENVIRONMENTS = [(f"bpy-{bpy}", LOCKS[bpy], python, True, True) for bpy, python i
 ENVIRONMENTS += [("bundle", LOCKS[EVERYDAY], EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [("site", "site", EVERYDAY_PYTHON, True, False)]
 ENVIRONMENTS += [("browsers", "browsers three", EVERYDAY_PYTHON, False, False)]
-ENVIRONMENTS += [("players", "players three", EVERYDAY_PYTHON, False, False)]
+ENVIRONMENTS += [("players", "players three babylon", EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in OTHERS]
 for _name, _locks, _version, _library, _addon in ENVIRONMENTS:
     _wheel = [f"wheel-{_version}"] * _library

@@ -66,6 +66,7 @@ class Row:
 
 OTHERS = [
     Row("three.js", "three.js", "threejs"),
+    Row("babylon.js", "Babylon.js", "babylon"),
     # Its clips have no time: no keys lie between others.
     Row("viser", "viser", "viser_view", unread=("two_keys",)),
     Row("f3d", "F3D", "f3d_view"),

@@ -49,6 +49,7 @@ _DATA = "assimp skins nothing itself, and normalises no weights: whoever reads t
 
 PLAYERS: dict[str, Player] = {
     "assimp": Player("assimp", 0, endings=(".glb", ".fbx"), note=_DATA),
+    "babylon.js": Player("Babylon.js", 8),
     "blender": Player("Blender", 0, endings=(".glb", ".usdc", ".fbx"), note=_TIMES),
     "f3d": Player("F3D", clips=SHOWN, note=_FIRST),
     "godot": Player("Godot", 8),

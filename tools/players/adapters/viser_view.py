@@ -2,22 +2,18 @@
 """viser, in Chromium without a window. It plays a file's clips by the clock: so that what it draws does not
 depend on when, this shows it a file for each time, in which all keys are those of that time."""
 
-import shutil
-import subprocess
 import tempfile
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
 import viser
-from adapter import DEGREES, EYE, PIXELS, MissingError, Task, main
+from adapter import DEGREES, EYE, PIXELS, Task, main
+from chromium import shown
 from glb import Glb
 
 # Half a turn about X: to look along -Z, with Y up.
 FORWARD = (0.0, 1.0, 0.0, 0.0)
-OPTIONS = "--headless=new --no-sandbox --use-angle=swiftshader --enable-unsafe-swiftshader --no-first-run"
 
 
 def stopped(path: Path, seconds: float) -> bytes:
@@ -36,21 +32,10 @@ def stopped(path: Path, seconds: float) -> bytes:
         return out.read_bytes()
 
 
-@contextmanager
-def client_of(server: viser.ViserServer) -> Iterator[viser.ClientHandle]:
-    program = shutil.which("chromium") or shutil.which("google-chrome")
-    if program is None:
-        raise MissingError("a program chromium")
-    with tempfile.TemporaryDirectory(ignore_cleanup_errors=True) as folder:
-        words = [program, *OPTIONS.split(), f"--user-data-dir={folder}"]
-        address = f"http://127.0.0.1:{server.get_port()}"
-        with subprocess.Popen([*words, address], stderr=subprocess.DEVNULL) as browser:
-            try:
-                while not server.get_clients():
-                    time.sleep(0.1)
-                yield next(iter(server.get_clients().values()))
-            finally:
-                browser.terminate()
+def client_of(server: viser.ViserServer) -> viser.ClientHandle:
+    while not server.get_clients():
+        time.sleep(0.1)
+    return next(iter(server.get_clients().values()))
 
 
 def seen(client: viser.ClientHandle) -> np.ndarray:
@@ -75,7 +60,8 @@ def drawn(client: viser.ClientHandle, server: viser.ViserServer, data: bytes) ->
 
 def play(task: Task) -> dict:
     server = viser.ViserServer(host="127.0.0.1", port=0, verbose=False)
-    with client_of(server) as client:
+    with shown(f"http://127.0.0.1:{server.get_port()}"):
+        client = client_of(server)
         still = [drawn(client, server, Path(path).read_bytes()) for path in task.still]
         outlines = [drawn(client, server, stopped(task.path, each)) for each in task.times]
     server.stop()

@@ -53,7 +53,9 @@ def test_names_of_players(text, name):
 
 
 def test_a_player_that_is_not_known():
-    with pytest.raises(WrongUse, match=r"expected a player, one of assimp, blender, .*, got 'unity'"):
+    with pytest.raises(
+        WrongUse, match=r"expected a player, one of assimp, babylon.js, blender, .*, got 'unity'"
+    ):
         players.player("unity")
 
 
@@ -84,6 +86,7 @@ def test_what_is_said_of_players():
     assert "weights whose sum" not in said
     assert "shows the next key without interpolation" in said
     assert "plays all that was measured" in sentences("three.js")
+    assert "plays all that was measured" in sentences("babylon.js", influences=8)
     assert "with more than four influences (" in sentences("three.js", influences=8)
     assert sentences("trimesh").startswith("trimesh does not skin: it shows the rest pose / to show a pose")
     assert "several clips (" in sentences("viser")
@@ -94,5 +97,7 @@ def test_what_is_said_of_players():
 
 
 def test_who_plays_more_than_four_influences():
-    assert players.more_than_four().startswith("assimp, Blender, Godot play more than four influences; F3D, ")
+    assert players.more_than_four().startswith(
+        "assimp, Babylon.js, Blender, Godot play more than four influences; F3D, "
+    )
     assert "trimesh" not in players.more_than_four()
