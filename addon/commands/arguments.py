@@ -16,7 +16,7 @@ from ..base.output import file_to_write, folder_to_write
 from ..skinning import parameters
 from ..skinning.variants import Variant, parse_list
 
-FILES = ".blend, .glb, .gltf or .fbx"
+FILES = ".blend, .glb, .gltf, .fbx or .usd (.usda, .usdc, .usdz)"
 
 
 def count(text: str, least: int = 1) -> int:
