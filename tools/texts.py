@@ -15,11 +15,10 @@ import sinew_addon
 from bl_ui.utils import PresetPanel
 from sinew_addon import registration
 from sinew_addon.features.diagnose import mending
-from sinew_addon.features.flex import limits
 from sinew_addon.features.gltf import players
 from sinew_addon.features.gltf.export_check import CAUSES, NAMED, NORMALS
 from sinew_addon.features.heat import heat_panel
-from sinew_addon.features.measure import battery, metrics, suggestion
+from sinew_addon.features.measure import battery, limits, metrics, suggestion
 from sinew_addon.features.suggest import recommendation
 from sinew_addon.skinning.engines import METHODS
 from sinew_addon.skinning.vertex_data import PROVIDERS

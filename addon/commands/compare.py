@@ -13,6 +13,7 @@ from ..base.output import folder_to_write, write_text
 from ..base.steps import result_of
 from ..features.measure.comparison import USUAL_METHODS, Comparison, RestFacts
 from ..features.measure.diagnostics import USUAL_INFLUENCES
+from ..features.measure.stray_weights import stray_weights
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
@@ -315,5 +316,10 @@ def _measure(
         measured.summaries,
         measured.times,
         measured.own,
-        {part.obj.name: part.edited.findings(args.influences) for part in subject.parts},
+        {
+            part.obj.name: [*stray, *part.edited.findings(args.influences)]
+            for part, stray in zip(
+                subject.parts, stray_weights([p.edited for p in subject.parts]), strict=True
+            )
+        },
     )
