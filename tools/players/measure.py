@@ -175,13 +175,16 @@ def shown(name: str, cell: dict | None) -> str:
         return ""
     if "said" in cell:
         return "no skin" if name == "plain" else "fails"
-    distance = cell["distance"]
-    text = f"{distance:.2g}"
-    if cell.get("outline") and distance < 1.5 * SEEN / 1024:
+    text = length(cell["distance"])
+    if cell.get("outline") and cell["distance"] < 1.5 * SEEN / 1024:
         text = "< 0.02"
-    elif distance < 5e-6:
-        text = "0"
-    return f"rest pose ({text})" if cell.get("rest") else text
+    return f"rest pose ({text})" if cell.get("rest") and name == "plain" else text
+
+
+def length(metres: float) -> str:
+    """Two digits, and nothing below rounding."""
+    digits = 5 if metres < 1e-3 else 1 - int(np.floor(np.log10(metres)))
+    return f"{metres:.{max(digits, 0)}f}" if metres >= 5e-6 else "0"
 
 
 def table_of(figures: list[dict]) -> str:

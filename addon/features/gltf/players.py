@@ -40,8 +40,8 @@ class Player:
 _STILL = "to show a pose there, export the mesh of that frame without its armature, such as a .obj"
 _FIRST = "F3D plays the first clip of a file, unless --animation-indices names another"
 _NEXT = (
-    "panda3d shows the next key without interpolation: export at 30 frames a second, which is its own rate, "
-    "and with a key at each frame"
+    "panda3d shows the next key without interpolation: the more frames a second the scene has, the less it "
+    "is ahead"
 )
 _AT_ONCE = "viser plays all clips of a file at once"
 _TIMES = "Blender's importer of USD does not interpolate, where channels have keys at different times"
