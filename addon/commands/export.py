@@ -87,7 +87,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
         console.note(f"{args.out}: {players.more_than_four()}")
     of_player: list[Phrase] = []
     if args.player is not None and args.verify:
-        of_player = players.sentences(args.player, ending, options.influences if ending == ".glb" else 0)
+        influences = options.influences if ending == ".glb" else 0
+        of_player = players.sentences(args.player, ending, influences, options.clips)
     elif args.player is not None and (warning := players.warning(args.player, ending)) is not None:
         console.note(f"{args.out}: {warning}")
     # Blender does not evaluate hidden objects.

@@ -101,14 +101,15 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
             layout.prop(self, name)
         if self.player != _ANY:
             for sentence in self.of_player():
-                draw_text(layout, sentence, icon="INFO")
+                draw_text(layout, sentence, icon="INFO", pixels=stepped.DIALOG)
         elif self.kind == ".glb" and self.influences > players.FOUR:
-            draw_text(layout, players.more_than_four(), icon="INFO")
+            draw_text(layout, players.more_than_four(), icon="INFO", pixels=stepped.DIALOG)
 
     def of_player(self) -> list[Phrase]:
         if self.kind not in players.PLAYERS[self.player].endings:
             return []
-        return players.sentences(self.player, self.kind, self.influences if self.kind == ".glb" else 0)
+        influences = self.influences if self.kind == ".glb" else 0
+        return players.sentences(self.player, self.kind, influences, self.clips)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         if self.player != _ANY:

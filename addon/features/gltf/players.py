@@ -15,8 +15,8 @@ from ...base.phrases import Phrase, phrase
 
 # Influences of a vertex that every player of glTF reads.
 FOUR = 4
-# Of a tube of 6 m, in metres: what is farther off is named.
-_WRONG = 0.01
+# Of a tube of 6 m, in metres: what is farther off is named. Outlines are measured by pixels of 0.0126.
+_WRONG = 0.02
 ALL_CLIPS, SHOWN = "all", "shown"
 
 
@@ -37,7 +37,7 @@ class Player:
     note: str = ""
 
 
-_STILL = "to show a pose there, export the mesh of that frame without its armature, such as a .obj"
+_STILL = "For a pose there, export the mesh of that frame without its armature, such as a .obj"
 _FIRST = "F3D plays the first clip of a file, unless --animation-indices names another"
 _NEXT = (
     "panda3d shows the next key without interpolation: the more frames a second the scene has, the less it "
@@ -143,10 +143,11 @@ def warning(name: str, ending: str) -> Phrase | None:
     return phrase("{player} does not skin: it shows the rest pose", player=PLAYERS[name].name)
 
 
-def sentences(name: str, ending: str, influences: int) -> list[Phrase]:
+def sentences(name: str, ending: str, influences: int, clips: str = ALL_CLIPS) -> list[Phrase]:
     """What the table says of a player.
 
     influences  of a vertex that the file has, at most; 0 for all
+    clips       of ExportOptions
     """
     its, row = PLAYERS[name], _row(name, ending)
     said = [phrase(its.note)] if its.note and (its.note is not _TIMES or ending == ".usdc") else []
@@ -159,6 +160,8 @@ def sentences(name: str, ending: str, influences: int) -> list[Phrase]:
     limits = {key: _WRONG if key == "plain" else least for key in PROPERTIES}
     if 0 < influences <= FOUR:
         del limits["six"]
+    if clips == SHOWN:
+        del limits["two_clips"]
     cells = {key: row["cells"].get(key) for key in limits}
     wrong = [
         _named(PROPERTIES[key], cell)
@@ -168,7 +171,7 @@ def sentences(name: str, ending: str, influences: int) -> list[Phrase]:
     version = row["version"]
     if not wrong:
         right = phrase(
-            "{player} {version} plays all that was measured as Blender shows it",
+            "{player} {version} plays what such a file has as Blender shows it",
             player=its.name,
             version=version,
         )

@@ -91,7 +91,11 @@ def test_the_panel_exports_for_a_player(file, tmp_path):
     scenes.add_sinew(bpy.context.scene.objects["Arm"], "lbs")
     bpy.ops.wm.save_mainfile()
     export = bpy.ops.sinew.export
-    assert export(kind=".glb", player="blender") == {"FINISHED"}
+    offered = export.get_rna_type().properties["player"].enum_items.keys()
+    assert offered == ["any", *(name for name, its in players.PLAYERS.items() if its.endings)]
+    assert export(kind=".glb", player="three.js") == {"FINISHED"}
+    assert sets_and_clips(file.with_suffix(".glb")) == (1, 2)
+    assert export(kind=".glb", player="blender", overwrite=True) == {"FINISHED"}
     assert sets_and_clips(file.with_suffix(".glb")) == (2, 2)
     assert export(kind=".glb", player="blender", influences=4, clips="shown", overwrite=True) == {"FINISHED"}
     assert sets_and_clips(file.with_suffix(".glb")) == (1, 1)

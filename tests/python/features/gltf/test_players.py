@@ -74,8 +74,8 @@ def test_files_that_a_player_does_not_read(name, ending, said):
     assert str(caught.value) == said
 
 
-def sentences(name, ending=".glb", influences=4):
-    return " / ".join(players.sentences(name, ending, influences))
+def sentences(name, ending=".glb", influences=4, clips="all"):
+    return " / ".join(players.sentences(name, ending, influences, clips))
 
 
 def test_what_is_said_of_players():
@@ -85,11 +85,14 @@ def test_what_is_said_of_players():
     )
     assert "weights whose sum" not in said
     assert "shows the next key without interpolation" in said
-    assert "plays all that was measured" in sentences("three.js")
-    assert "plays all that was measured" in sentences("babylon.js", influences=8)
+    assert "plays what such a file has as Blender shows it" in sentences("three.js")
+    assert "plays what such a file has as Blender shows it" in sentences("babylon.js", influences=8)
     assert "with more than four influences (" in sentences("three.js", influences=8)
-    assert sentences("trimesh").startswith("trimesh does not skin: it shows the rest pose / to show a pose")
+    assert sentences("trimesh").startswith(
+        "trimesh does not skin: it shows the rest pose / For a pose there,"
+    )
     assert "several clips (" in sentences("viser")
+    assert "plays what such a file has" in sentences("viser", clips="shown")
     assert "several clips" not in sentences("f3d")
     assert sentences("godot") == "Godot was not measured"
     assert "importer of USD" in sentences("blender", ".usdc")
