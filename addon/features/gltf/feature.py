@@ -73,7 +73,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         description="Chooses what this player plays best",
         items=[
             (_ANY, "Any", "What most players take"),
-            *((name, its.name, "") for name, its in players.PLAYERS.items() if its.endings),
+            *((name, its.name, players.takes(name)) for name, its in players.PLAYERS.items() if its.endings),
         ],
         update=_choose,
     )

@@ -81,6 +81,20 @@ PROPERTIES = {
 }
 
 
+_TAKES = {
+    (FOUR, ALL_CLIPS): "Four influences a vertex, all clips",
+    (FOUR, SHOWN): "Four influences a vertex, one clip",
+    (8, ALL_CLIPS): "Eight influences a vertex, all clips",
+    (0, ALL_CLIPS): "All influences, all clips",
+}
+
+
+def takes(name: str) -> str:
+    """What a player plays best, in words."""
+    its = PLAYERS[name]
+    return _TAKES[its.influences, its.clips]
+
+
 def player(text: str) -> str:
     """The name in PLAYERS of what a user calls a player, such as threejs. Raises WrongUse."""
     found = [name for name in PLAYERS if _letters(name) == _letters(text)]
