@@ -140,10 +140,10 @@ def is_read_by_others(obj: bpy.types.Object) -> bool:
 
 @cache
 def users_of_all() -> dict[bpy.types.ID, set[bpy.types.ID]]:
-    """Returns who uses each object, mesh and so on, without Sinew's helpers. Found once: each event clears
-    the cache."""
-    helpers = {obj for obj in bpy.data.objects if properties.is_helper(obj)}
-    return {used: users - helpers for used, users in bpy.data.user_map().items()}
+    """Returns who uses each object, mesh and so on, without Sinew's helpers, and without the copies of a
+    comparison, which do not read their originals. Found once: each event clears the cache."""
+    own = {obj for obj in bpy.data.objects if properties.is_helper(obj) or properties.is_copy(obj)}
+    return {used: users - own for used, users in bpy.data.user_map().items()}
 
 
 def _collections_of(obj: bpy.types.Object) -> set[bpy.types.Collection]:

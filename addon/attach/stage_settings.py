@@ -34,6 +34,7 @@ _CHOICES = {
     "blender": ("Shorter Way", "As Blender: a vertex turns the shorter way between its bones"),
     "hierarchy": ("Along the Chain", "Turns add up from bone to bone, beyond half a turn"),
 }
+_LARGE_GROUP = 4
 # Scales that differ by no more than this part are the same: matrices of objects that rotate are rounded.
 SAME_SCALE = 1e-4
 # Choice of a parameter that names a method: the stage is off.
@@ -163,15 +164,17 @@ def _property(parameter: sinew.Parameter, update: Callable) -> object:
 
 
 def method_items(first_number: int = 0) -> list[tuple[str, str, str, int]]:
-    """Returns the items. Blender shows an item without identifier as a heading. A property with these items
-    needs a default: otherwise it would be the first heading.
+    """Returns the items. Blender shows an item without identifier as the heading of a new column, so only
+    large groups have one. A property with these items needs a default: it could be a heading otherwise.
 
     first_number  added to the numbers of methods, which start at 1
     """
     items = []
     groups = groupby(engines.METHODS.values(), lambda method: method.group)
-    for number, (group, methods) in enumerate(groups, start=1):
-        # Negative, so never the value of a property.
-        items.append(("", group, "", -number))
+    for number, (group, each) in enumerate(groups, start=1):
+        methods = list(each)
+        if len(methods) >= _LARGE_GROUP:
+            # Negative, so never the value of a property.
+            items.append(("", group, "", -number))
         items += [(m.name, m.label, m.description, m.number + first_number) for m in methods]
     return items

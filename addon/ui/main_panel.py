@@ -94,7 +94,7 @@ def _draw_add(layout: bpy.types.UILayout, meshes: list[bpy.types.Object]) -> Non
     if len(meshes) > 1:
         text = counted(count, "Add Sinew to {count} Mesh", "Add Sinew to {count} Meshes")
     row.operator("sinew.add", text=text, icon="MOD_ARMATURE")
-    row.operator_menu_enum("sinew.add", "method", text="", icon="DOWNARROW_HLT")
+    row.popover(SINEW_PT_methods.__name__, text="", icon="DOWNARROW_HLT")
     for obj in meshes:
         for sentence in () if properties.has_sinew(obj) else other_tools.warnings(obj):
             draw_text(layout, sentence, icon="ERROR")
@@ -113,9 +113,14 @@ def _draw_character(
     column.active = shared.enabled
     draw_method(column, settings, SINEW_PT_methods.__name__)
     stepped.draw_progress(layout, "sinew.recommend")
-    row = layout.row(align=True)
-    row.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
-    row.operator("sinew.compare", text="Compare\u2026")
+    column = layout.column(align=True)
+    column.prop(shared, "enabled", text=state_text.switch_text(meshes), toggle=True)
+    row = column.row(align=True)
+    # A feature's, which this panel does not know.
+    if bpy.ops.sinew.end_comparison.poll():
+        row.operator("sinew.end_comparison")
+    else:
+        row.operator("sinew.compare", text="Compare\u2026")
     if not stepped.draw_progress(row, "sinew.suggest"):
         row.operator("sinew.suggest", text="Suggest")
     if any(session.plan_of(obj).state is State.REFUSED for obj in meshes):

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Sinew in Blender's menus, where F3 finds it, a pie menu, and shortcuts."""
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from itertools import chain, groupby
 from pathlib import Path
@@ -10,15 +10,16 @@ from typing import ClassVar
 import bpy
 import bpy.utils.previews
 import rna_keymap_ui
+import sinew
 
 from ..attach import properties
 from ..attach.feature import Feature
-from ..skinning.engines import ENGINE_GROUP
+from ..skinning.engines import ENGINE_GROUP, Engine
 from . import character, operators
 from .stepped import OVER
 
 # One elbow under each method (tools/pictures/draw_sheets.py), and its height in lines of a menu.
-PICTURES, PICTURE_HEIGHT = Path(__file__).with_name("pictures"), 1.8
+PICTURES, PICTURE_HEIGHT = Path(__file__).with_name("pictures"), 3.0
 # Holds what Blender loads of them; empty without a window.
 _pictures: list[bpy.utils.previews.ImagePreviewCollection] = []
 
@@ -49,58 +50,70 @@ class SINEW_MT_methods(bpy.types.Menu):
     bl_description = "How the bones' motions are blended, for all meshes of the character"
 
     def draw(self, context: bpy.types.Context) -> None:
-        _draw_methods(context, self.layout)
+        _draw_recommended(context, self.layout)
+        for group, methods in _groups():
+            self.layout.label(text=group)
+            for method in methods:
+                _draw_method(context, self.layout, method)
 
 
 class SINEW_PT_methods(bpy.types.Panel):
-    """The same with pictures, which a menu would not put beside names."""
+    """The same with pictures, which a menu would not put beside names, in two columns."""
 
     bl_label = "Method"
     bl_description = SINEW_MT_methods.bl_description
     bl_space_type = "VIEW_3D"
     bl_region_type = "WINDOW"
     bl_options: ClassVar[set[str]] = {"INSTANCED"}
-    bl_ui_units_x = 11
+    bl_ui_units_x = 25
 
     def draw(self, context: bpy.types.Context) -> None:
-        row = self.layout.split(factor=0.2)
-        pictures = row.column()
-        _draw_methods(context, row.column(), pictures, self.layout.column())
+        _draw_recommended(context, self.layout)
+        row = self.layout.row()
+        columns, height = (row.column(), row.column()), 0.0
+        half = sum(_height(*each) for each in _groups()) / 2.0
+        for group, methods in _groups():
+            column = columns[height >= half]
+            height += _height(group, methods)
+            column.label(text=group)
+            for method in methods:
+                if group == ENGINE_GROUP:
+                    _draw_method(context, column, method)
+                    continue
+                split = column.split(factor=0.28)
+                split.template_icon(_pictures[0][method.name].icon_id, scale=PICTURE_HEIGHT)
+                name = split.column()
+                name.scale_y = PICTURE_HEIGHT
+                _draw_method(context, name, method)
 
 
-def _draw_methods(
-    context: bpy.types.Context,
-    names: bpy.types.UILayout,
-    pictures: bpy.types.UILayout | None = None,
-    below: bpy.types.UILayout | None = None,
+def _groups() -> list[tuple[str, list[sinew.Method | Engine]]]:
+    methods = properties.METHODS.values()
+    return [(group, list(each)) for group, each in groupby(methods, lambda method: method.group)]
+
+
+def _height(group: str, methods: Sequence[sinew.Method | Engine]) -> float:
+    """Of a group with its pictures, in lines; what engines show has none."""
+    return 1.0 + len(methods) * (1.0 if group == ENGINE_GROUP else PICTURE_HEIGHT)
+
+
+def _draw_recommended(context: bpy.types.Context, layout: bpy.types.UILayout) -> None:
+    if character.lead(context) is None:
+        layout.operator("sinew.add", text="Recommended", icon="SOLO_ON").method = operators.RECOMMENDED
+        return
+    # From a menu, too, in steps.
+    row = layout.row()
+    row.operator_context = "INVOKE_DEFAULT"
+    row.operator("sinew.recommend", icon="SOLO_ON")
+
+
+def _draw_method(
+    context: bpy.types.Context, layout: bpy.types.UILayout, method: sinew.Method | Engine
 ) -> None:
-    """below: for what engines show, which has no pictures"""
     lead = character.lead(context)
     operator = "sinew.add" if lead is None else "sinew.use_method"
-    if pictures is not None:
-        pictures.label()
-    if lead is None:
-        names.operator("sinew.add", text="Recommended", icon="SOLO_ON").method = operators.RECOMMENDED
-    else:
-        # From a menu, too, in steps.
-        row = names.row()
-        row.operator_context = "INVOKE_DEFAULT"
-        row.operator("sinew.recommend", icon="SOLO_ON")
-    for group, methods in groupby(properties.METHODS.values(), lambda method: method.group):
-        has_pictures = pictures is not None and group != ENGINE_GROUP
-        column = names if below is None or has_pictures else below
-        column.label(text=group)
-        if has_pictures:
-            pictures.label()
-        elif column is below:
-            column = column.grid_flow(row_major=True, columns=2, even_columns=True)
-        for method in methods:
-            row = column.row()
-            if has_pictures:
-                pictures.template_icon(_pictures[0][method.name].icon_id, scale=PICTURE_HEIGHT)
-                row.scale_y = PICTURE_HEIGHT
-            is_used = lead is not None and properties.of(lead).method == method.name
-            row.operator(operator, text=method.label, depress=is_used).method = method.name
+    is_used = lead is not None and properties.of(lead).method == method.name
+    layout.operator(operator, text=method.label, depress=is_used).method = method.name
 
 
 def _draw_entries(layout: bpy.types.UILayout, entries: Iterable[Entry]) -> None:

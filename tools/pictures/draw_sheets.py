@@ -20,7 +20,7 @@ from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import sinew as library
-from PIL import Image, ImageDraw, ImageFont
+from PIL import Image, ImageChops, ImageDraw, ImageFont
 
 REPOSITORY = Path(__file__).resolve().parents[2]
 BLEND_FILES = REPOSITORY / "blend_files"
@@ -42,6 +42,10 @@ SHEETS = {
         ("bulge_limit=on", "delta_mush=on", "delta_mush.iterations=20"),
     ),
 }
+
+# In which it is bent by some 130 degrees, and where the joint is in a picture of 512 pixels: left, top, right,
+# bottom.
+ELBOW_FRAME, ELBOW = 21, (212, 102, 500, 390)
 
 
 def find(name: str) -> Path:
@@ -90,15 +94,16 @@ def draw_elbows(_target: Path) -> None:
     folder, methods = REPOSITORY / "addon/ui/pictures", [method.name for method in library.methods()]
     with tempfile.TemporaryDirectory() as place:
         sinew(
-            *("compare", find("elbow.blend"), "--methods", ",".join(methods), "--frames", "24"),
-            *("--size", "256", "--pictures", "1", "--out", place),
+            *("compare", find("elbow.blend"), "--methods", ",".join(methods), "--frames", str(ELBOW_FRAME)),
+            *("--size", "512", "--pictures", "1", "--out", place),
         )
         for method in methods:
-            picture = Image.open(Path(place, f"elbow/pictures/{method}-24.png")).convert("RGBA")
-            cut = picture.crop(
-                (picture.width - 140, picture.height - 130, picture.width - 10, picture.height)
-            )
-            cut.resize((96, 96), Image.Resampling.LANCZOS).save(folder / f"{method}.png", optimize=True)
+            picture = Image.open(Path(place, f"elbow/pictures/{method}-{ELBOW_FRAME}.png")).convert("RGBA")
+            cut = picture.crop(ELBOW).resize((128, 128), Image.Resampling.LANCZOS)
+            # The limb goes on to the left: it fades out there.
+            fade = Image.linear_gradient("L").rotate(90).point(lambda far: min(5 * far, 255))
+            cut.putalpha(ImageChops.multiply(cut.getchannel("A"), fade.resize(cut.size)))
+            cut.save(folder / f"{method}.png", optimize=True)
 
 
 def photograph(page: Path, target: Path, width: int, height: int) -> None:

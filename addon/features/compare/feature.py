@@ -247,9 +247,7 @@ class SINEW_PT_comparison(Sidebar, bpy.types.Panel):
         _draw_arrangement(layout, context, state)
         if state.collection is not None:
             layout.prop(state.collection, "hide_render", text="Render the Copies", invert_checkbox=True)
-        row = layout.row(align=True)
-        row.operator("sinew.compare", text="Methods…")
-        row.operator("sinew.end_comparison", icon="X")
+        layout.operator("sinew.compare", text="Methods…")
         if not stepped.draw_progress(layout, SINEW_OT_save_comparison.bl_idname):
             layout.operator("sinew.save_comparison", icon="URL")
 

@@ -21,13 +21,10 @@ from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
 from ..measure.measured_on import CHOICE, MeasuredOn
 from ..measure.suggestion import CRITERIA, Criterion, Suggestion
-from . import recommend, suggest, worst_pictures
+from . import recommend, suggest
 from .recommendation import Choice
 
 BEST = "best"
-PICTURES_IN_A_ROW = 2
-# In lines of the panel.
-PICTURE_HEIGHT = 5.0
 # Several methods can be equally good.
 MOST_BEST = 3
 
@@ -153,28 +150,6 @@ class SINEW_PT_suggest(Sidebar, bpy.types.Panel):
         self.layout.operator_menu_enum("sinew.suggest", "over", text="Measure Again", icon="VIEWZOOM")
 
 
-class SINEW_PT_suggest_pictures(Sidebar, bpy.types.Panel):
-    bl_label = "At Their Worst"
-    bl_parent_id = "SINEW_PT_suggest"
-
-    @classmethod
-    def poll(cls, context: bpy.types.Context) -> bool:
-        return context.scene.session_uid in suggest.suggestions and worst_pictures.are_drawn()
-
-    def draw(self, context: bpy.types.Context) -> None:
-        suggestion, _choice, basis = suggest.suggestions[context.scene.session_uid]
-        used = _used(context)
-        self.layout.active = not basis.changes(context.scene, sinew_targets(context))
-        draw_text(self.layout, "Each where it stretches most, in its worst frame")
-        grid = self.layout.grid_flow(row_major=True, columns=PICTURES_IN_A_ROW, even_columns=True)
-        for method in suggestion.methods:
-            number = worst_pictures.icon(context.scene, method)
-            if number:
-                cell = grid.column(align=True)
-                cell.template_icon(number, scale=PICTURE_HEIGHT)
-                _draw_method(cell, suggestion, method, used)
-
-
 def _use(context: bpy.types.Context, choice: Choice) -> None:
     with session.changing(context):
         variant_settings.use_values(character.followers(context), choice.variant.method, choice.values)
@@ -257,7 +232,6 @@ FEATURE = Feature(
         SINEW_OT_use_recommended,
         SINEW_OT_suggestions_by,
         SINEW_PT_suggest,
-        SINEW_PT_suggest_pictures,
     ),
     subscriptions=((subscribers.loading, suggest.forget),),
     begin=_begin,

@@ -17,7 +17,7 @@ from ..measure.measured_on import CHOICE, STAGES, MeasuredOn, armatures_of
 from ..measure.metrics import Measured
 from ..measure.suggestion import LONGEST, MEASURED, Suggestion
 from ..measure.worst_frames import check_measurable, measure_at
-from . import recommend, worst_pictures
+from . import recommend
 from .recommendation import Choice
 
 RECOMMENDED = "recommended"
@@ -57,26 +57,20 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     suggestion = Suggestion(
         labels | ({RECOMMENDED: "Recommended"} if choice.variant.stages else {}), frames, 0.0
     )
-    moments: dict[float, live.Moment] = {}
     with stepped.kept_frame(scene, armatures):
-        for frame in frames:
+        for count, frame in enumerate(frames):
             subject = measure_at(scene, objects, properties.BLENDER, frame)
             at_rest = crossings(subject.gauge.rest) if frame in counted else None
             suggestion.diagonal = subject.measured.rest.diagonal
-            moments[frame] = moment = live.Moment.of(subject)
+            moment = live.Moment.of(subject)
             for number, method in enumerate(suggestion.methods, start=1):
                 measured = _measured(method, moment, choice)
                 _add(suggestion, method, frame, measured, choice)
                 if at_rest is not None:
                     new = len(crossings(measured.shape) - at_rest)
                     suggestion.add(method, "crossings", new, frame)
-                done = len(moments) - 1 + number / len(suggestion.methods)
+                done = count + number / len(suggestion.methods)
                 yield CHOOSING + (1.0 - CHOOSING) * done / len(frames)
-    worst_pictures.begin(scene)
-    for name in suggestion.methods if worst_pictures.are_drawn() else ():
-        moment = moments[suggestion.worst[name, LONGEST].frame]
-        worst_pictures.add(scene, name, _measured(name, moment, choice))
-        yield 1.0
     suggestions[scene.session_uid] = Known(suggestion, choice, basis)
     recommend.keep(scene, choice, of_choice)
 
@@ -87,12 +81,10 @@ def drop_old(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> Non
     choice = recommend.choices.get(scene.session_uid)
     if known is not None and (known.choice != choice or known.basis.changes(scene, objects)):
         del suggestions[scene.session_uid]
-        worst_pictures.remove(scene)
 
 
 def forget() -> None:
     suggestions.clear()
-    worst_pictures.clear()
     recommend.forget()
 
 

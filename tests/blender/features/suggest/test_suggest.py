@@ -14,7 +14,7 @@ from sinew_addon.features.flex import feature as flex_feature
 from sinew_addon.features.measure import worst_frames
 from sinew_addon.features.measure.crossings import crossing_triangles
 from sinew_addon.features.measure.suggestion import CRITERIA, MEASURED, Suggestion
-from sinew_addon.features.suggest import recommend, suggest, worst_pictures
+from sinew_addon.features.suggest import recommend, suggest
 from sinew_addon.io import actions
 from sinew_addon.ui import stepped
 
@@ -96,29 +96,6 @@ def test_crossings_are_pairs_without_a_common_vertex():
     # Adjacent faces share vertices.
     assert crossing_triangles(points, triangles[[0, 2]]) == set()
     assert crossing_triangles(points, triangles[[0, 3]]) == set()
-
-
-def test_pictures_are_drawn_where_each_is_worst(monkeypatch):
-    """As in a window: without one there are none."""
-    obj, _armature = scenes.skinned_arm("lbs", sides=16, rings=41)
-    bpy.ops.sinew.suggest()
-    scene = bpy.context.scene
-    assert not worst_pictures.icon(scene, "lbs")
-    monkeypatch.setattr(worst_pictures, "are_drawn", lambda: True)
-    seen = []
-    monkeypatch.setattr(
-        worst_pictures.shaded,
-        "draw",
-        lambda *args, own=worst_pictures.shaded.draw: seen.append(own(*args)) or seen[-1],
-    )
-    list(suggest.scan(scene, [obj], "SCENE"))
-    assert len(seen) == len(found().methods)
-    middles = [picture[picture.shape[0] // 2, picture.shape[1] // 2, 3] for picture in seen]
-    # The place is in the middle of its picture.
-    assert np.mean(middles) > 0.9
-    assert set(worst_pictures._pictures[scene.session_uid]) == set(found().methods)
-    worst_pictures.clear()
-    assert not worst_pictures.icon(scene, "lbs")
 
 
 def move_a_vertex(obj: bpy.types.Object, _armature: bpy.types.Object) -> None:
