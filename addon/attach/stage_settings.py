@@ -31,10 +31,12 @@ _CHOICES = {
     "0": ("Nearest Rotation", "Variant 0 of the paper: the rotation that fits the neighbourhood best"),
     "2": ("Blended Quaternion", "Variant 2 of the paper: the blended quaternion, faster"),
     "4": ("Smoothed Weights", "Variant 4 of the paper: the blended quaternion of smoothed weights, fastest"),
-    "blender": ("Shorter Way", "As Blender: a vertex turns the shorter way between its bones"),
-    "hierarchy": ("Along the Chain", "Turns add up from bone to bone, beyond half a turn"),
+    "blender": ("Shortest", "As Blender: a vertex rotates the shortest way between its bones"),
+    "hierarchy": ("Along the Chain", "Rotations add up from bone to bone, beyond 180 degrees"),
 }
 _LARGE_GROUP = 4
+# What riggers call parameters that the library calls otherwise.
+_LABELS = {"signs": "Rotation Path", "turns": "Beyond 180\u00b0"}
 # Scales that differ by no more than this part are the same: matrices of objects that rotate are rounded.
 SAME_SCALE = 1e-4
 # Choice of a parameter that names a method: the stage is off.
@@ -130,9 +132,13 @@ def vertex_groups(settings: bpy.types.PropertyGroup) -> dict[str, str]:
     }
 
 
+def label_of(parameter: sinew.Parameter) -> str:
+    return _LABELS.get(parameter.id, parameter.label)
+
+
 def _property(parameter: sinew.Parameter, update: Callable) -> object:
     facts = {
-        "name": parameter.label,
+        "name": label_of(parameter),
         "description": parameter.description,
         "update": update,
         "override": OVERRIDABLE,

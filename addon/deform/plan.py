@@ -226,7 +226,7 @@ def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
         return Normals(), ""
     reasons = (
         (bool(facts.normals_obstacle), facts.normals_obstacle),
-        (facts.has_heat_map, "it shows a heat map"),
+        (facts.has_heat_map, "its heat map is shown"),
     )
     obstacle = next((reason for holds, reason in reasons if holds), "")
     if obstacle:
@@ -241,7 +241,7 @@ def _why_not_in_depsgraph(facts: ObjectFacts) -> str:
         (bool(facts.failure), f"Within Blender's evaluation it failed: {facts.failure}"),
         (facts.is_comparison_copy, "A copy for comparison"),
         (facts.upstream_changes_weights, "Modifiers in front of the Armature modifier change weights"),
-        (facts.has_heat_map, "It shows a heat map"),
+        (facts.has_heat_map, "Slower while its heat map is shown"),
         (facts.is_deforming_body, "Its rigid body is simulated from the deformed mesh"),
         (facts.visibility_is_keyed, "The visibility of its modifier is animated"),
         (facts.views_differ, "An Armature modifier is on in the viewport or in renders alone"),

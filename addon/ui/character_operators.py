@@ -5,11 +5,11 @@ import contextlib
 
 import bpy
 
-from ..attach import properties
+from ..attach import other_tools, properties
 from ..attach.feature import Feature
 from ..base.errors import SinewError
 from ..deform import session
-from . import character
+from . import character, state_text
 from .operators import Named, OnSinewObjects, active_object, sinew_targets
 from .sidebar import Sidebar
 from .translations import tip, tr
@@ -76,6 +76,14 @@ class SINEW_OT_open_tab(Named, bpy.types.Operator):
     bl_label = "Open the Sinew Tab"
     bl_description = "Show the tab Sinew in the sidebar of the 3D view"
     bl_options = {"REGISTER"}
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, _values: bpy.types.OperatorProperties) -> str:
+        """Beside the modifiers of a mesh, also says who deforms it."""
+        obj, text = context.object, tip(cls.bl_description)
+        if context.area is None or context.area.type != "PROPERTIES" or not properties.has_sinew(obj):
+            return text
+        return ". ".join((state_text.sentence_of(obj), tr(other_tools.APPLYING), text))
 
     @classmethod
     def refusal(cls, context: bpy.types.Context) -> str:

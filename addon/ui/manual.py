@@ -19,7 +19,7 @@ _OPERATORS = (
     ("suggest", "suggest"),
     ("in-betweens", "bake_inbetweens", "original_action"),
     ("blend-actions", "blend"),
-    ("bake", "bake", "corrective_key", "export"),
+    ("bake", "bake", "use_before", "corrective_key", "export"),
     ("compare", "compare", "*comparison"),
     ("heat-map", "*heat", "worst_frames", "go_to_frame"),
     ("range-of-motion", "*motion_range"),

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The sidebar tab, and its content where the native library does not load."""
 
-import textwrap
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
+import blf
 import bpy
 
 from .. import native
@@ -11,6 +11,8 @@ from .translations import tr
 
 # Characters of the interface font per pixel of sidebar at scale 1; Blender does not wrap labels.
 CHARACTERS_PER_PIXEL = 0.14
+# Points beside a text in a box of a panel, in a dialog, and of an icon; no text is narrower.
+MARGIN, DIALOG_MARGIN, ICON, NARROWEST = 76, 36, 22, 100
 # For a name among others.
 NAME_LENGTH = 24
 
@@ -82,19 +84,49 @@ def draw_text(
     icon: str = "NONE",
     alert: bool = False,
     pixels: int | None = None,
+    beside: int = 0,
     **values: object,
 ) -> None:
     """Draws text in the user's language, wrapped into as many labels as the width needs.
 
+    beside  buttons with an icon alone that follow in its row
     pixels  of a dialog, without the interface's scale; None: the region's width
     values  as tr() takes them
     """
-    width = max(20, characters(pixels) - (4 if icon != "NONE" else 0))
+    width = _room(pixels) - ICON * (beside + (icon != "NONE"))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8
-    # A name may be longer than a line; wrapped, it would look like two.
-    text = " ".join(shortened(word, width) for word in tr(text, **values).split())
-    for number, line in enumerate(textwrap.wrap(text, width, break_on_hyphens=False)):
+    for number, line in enumerate(_lines(tr(text, **values), max(width, NARROWEST))):
         shown = icon if number == 0 or icon == "NONE" else "BLANK1"
         column.label(text=line, icon=shown, translate=False)
+
+
+def _room(pixels: int | None) -> float:
+    """Points that a text in a box may be wide; as draw_text() takes it."""
+    context = bpy.context
+    if pixels is not None:
+        return pixels - DIALOG_MARGIN
+    return context.region.width / context.preferences.system.ui_scale - MARGIN
+
+
+def _lines(text: str, width: float) -> Iterator[str]:
+    """Yields the lines of a text that are no wider than so many points."""
+    blf.size(0, bpy.context.preferences.ui_styles[0].widget.points)
+    line = ""
+    for word in text.split():
+        if _width(word) > width:
+            # A name may be longer than a line; wrapped, it would look like two.
+            word = shortened(word, int(len(word) * width / _width(word)))
+        longer = f"{line} {word}" if line else word
+        if line and _width(longer) > width:
+            yield line
+            longer = word
+        line = longer
+    if line:
+        yield line
+
+
+def _width(text: str) -> float:
+    """In points, by the interface's font."""
+    return blf.dimensions(0, text)[0]

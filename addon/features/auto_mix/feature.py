@@ -17,8 +17,8 @@ class SINEW_OT_auto_mix(OnSinewObjects, OfOneMesh, stepped.Stepped, bpy.types.Op
     bl_label = "Auto-Mix"
     bl_description = (
         "Measure both methods of the mix over the frames, and paint its vertex group: at each vertex the one "
-        "with less stretch, lost volume and crossings, smoothed over the surface. Without a second method it "
-        "takes dual quaternions, or linear blending beside them"
+        "with less stretch, lost volume and self-intersection, smoothed over the surface. Without a second "
+        "method it takes dual quaternions, or linear blending beside them"
     )
     saying = "Sinew measures two methods"
 

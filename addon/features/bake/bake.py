@@ -10,10 +10,11 @@ import numpy as np
 from ...attach import attach, stack, upstream_proxy
 from ...base.errors import SinewError
 from ...base.names import as_file_name
+from ...base.phrases import Phrase, phrase
 from ...deform import characters
 from ...io import files
 from ...io.actions import curves_of
-from . import bake_export, bake_state, baked_files, shape_animation
+from . import bake_export, bake_state, baked_files, kept, shape_animation
 from .bake_bones import BoneBake
 from .bake_state import Started, skinned_now, take_off
 from .bake_vat import VatBake
@@ -53,6 +54,10 @@ class ShapeKeys:
         if mesh.shape_keys is not None:
             obj.shape_key_clear()
         shape_animation.add(obj, self.frames, shapes)
+
+    @property
+    def sentence(self) -> Phrase:
+        return phrase("{count} shape keys, one a frame", count=len(self.frames))
 
     files = ()
 
@@ -106,6 +111,10 @@ class Cache:
         shape_animation.make_straight(obj, path)
 
     @property
+    def sentence(self) -> Phrase:
+        return phrase("{name}: {count} frames", name=self.file.path.name, count=len(self.frames))
+
+    @property
     def files(self) -> list[tuple[Path, Path]]:
         return [(self.file.unfinished, self.file.path)]
 
@@ -157,6 +166,7 @@ class Bake(Started):
                 # Sinew's own position in the stack while it deforms, not the one while Blender does.
                 attach.switch(one.obj, on=True)
                 one.place()
+                kept.note_sentences(one.obj, [one.sentence])
 
     @property
     def files(self) -> list[tuple[Path, Path]]:

@@ -17,7 +17,7 @@ from ...skinning.influences import Influences, joined
 from ...skinning.skin_stack import ModifierFrame, SkinDeformer, SkinStack
 from ...skinning.stages import StageValues
 from ...skinning.vectors import transformed
-from . import bake_state, helper_bones, helper_bones_io, pose_helpers, pose_samples, shape_animation
+from . import bake_state, helper_bones, helper_bones_io, kept, pose_helpers, pose_samples, shape_animation
 from .bake_state import Started, take_off
 from .helper_bones import POSE, Errors, HelperOptions, Motion, Report
 from .segment_bones import SegmentErrors, SegmentReport
@@ -249,6 +249,7 @@ class _Rig:
                 (helper_bones_io.ERRORS_BEFORE, solution.errors_before),
             ):
                 mesh_io.write_values(obj.data, name, self._unit * errors[rows])
+            kept.note_sentences(obj, self.report.sentences(characters.length_unit(bpy.context.scene)))
 
     def _rows(self) -> Iterator[tuple[bpy.types.Object, slice]]:
         """The meshes, each with its vertices among those of all."""
@@ -273,6 +274,15 @@ class _Rig:
                 bake_state.use_copy_of_mesh(obj)
             helper_bones_io.write_weights(obj, self._bones, movers, slots[rows], weights[rows])
         return [self._segments.report(self.rig.name, self._unit)]
+
+
+def joint_counts(meshes: Sequence[bpy.types.Object]) -> list[int]:
+    """Returns how many joints move vertices, for each armature; empty where Sinew deforms none."""
+    found: dict[bpy.types.Object, set[int]] = {}
+    for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+        influences = state.bound.first_deformer.weighting.influences(state.shown.rest_points)
+        found.setdefault(properties.of(obj).armature, set()).update(influences.bones.tolist())
+    return [max(len(bones) - 1, 0) for bones in found.values()]
 
 
 def _use_armature_modifier(obj: bpy.types.Object, rig: bpy.types.Object) -> None:

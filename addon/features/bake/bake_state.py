@@ -16,7 +16,7 @@ from ...base.output import remove
 from ...deform import session
 from ...deform.plan import ARMATURE_MODIFIER_MODES
 from ...deform.skinned_object import SkinnedObject
-from . import baked_files
+from . import baked_files, kept
 
 
 class Started:
@@ -62,6 +62,7 @@ class Started:
 def take_off(obj: bpy.types.Object) -> None:
     """Takes Sinew off an object whose shape is in a bake from now on; the Armature modifiers stay as they
     were, and anything that the bake already includes is switched off."""
+    kept.note_variant(obj)
     # A deforming parent would deform the baked shape again.
     properties.of(obj).before.parent_type = ""
     smooth = corrective_smooth.replaced_modifier(obj)

@@ -2,19 +2,20 @@
 """Bakes: an operator, and the panel of what plays without Sinew."""
 
 from collections.abc import Iterator
+from itertools import chain
 
 import bpy
 
 from ...attach.feature import Feature
 from ...base.frames import parse_frames
 from ...base.options import options_of, read_options
-from ...deform import characters
+from ...deform import characters, session
 from ...ui import stepped
-from ...ui.operators import OfSkinned, OnSinewObjects, sinew_targets
+from ...ui.operators import OnSinewObjects, has_sinew_targets, sinew_targets, targets
 from ...ui.options import with_options
 from ...ui.sidebar import Sidebar, draw_text
-from ...ui.translations import tr
-from . import bake, bake_apart, bake_bones, bake_state
+from ...ui.translations import tip, tr
+from . import bake, bake_apart, bake_bones, bake_state, kept
 from .baked_files import BONES, EXPORTS, FILES, VAT
 from .helper_bones import HelperOptions
 from .vat import VatOptions
@@ -56,16 +57,27 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
         name="Step", description="Every so many of the frames", default=1, min=1, soft_max=12
     )
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
+        self.joints = [] if self.in_steps else bake_bones.joint_counts(sinew_targets(context))
+        return super().invoke(context, event)
+
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
         of_kind = options_of(HelperOptions) if self.kind == BONES else ()
         if self.kind not in WITHOUT_FILES:
             of_kind = ("folder", "overwrite", *(options_of(VatOptions) if self.kind == VAT else ()))
-        for name in ("kind", "frames", "step", *of_kind):
+        scene = context.scene
+        layout.prop(self, "kind")
+        layout.prop(self, "frames", placeholder=f"{scene.frame_start}-{scene.frame_end}")
+        for name in ("step", *of_kind):
             layout.prop(self, name)
+            if name == "helpers" and not self.helpers:
+                counts = ", ".join(str(2 * count) for count in self.joints)
+                draw_text(layout, "Two a joint: {count}", pixels=stepped.DIALOG, count=counts)
         if self.kind not in FILES:
-            layout.label(text="Takes Sinew off: what is baked plays without it", icon="INFO")
+            text = "Takes Sinew off: what is baked plays without it"
+            draw_text(layout, text, icon="INFO", pixels=stepped.DIALOG)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         self.started = self._start(context)
@@ -94,16 +106,52 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
         return bake.start(meshes, self.kind, frames, target, self.overwrite, *options)
 
 
-class SINEW_PT_bake(Sidebar, OfSkinned, bpy.types.Panel):
+class SINEW_OT_use_before_bake(OnSinewObjects, bpy.types.Operator):
+    bl_label = "As Before the Bake"
+    bl_description = "Deform the character by the method and stages that it had when it was baked"
+    bl_options = {"REGISTER", "UNDO", "INTERNAL"}
+
+    @classmethod
+    def description(cls, context: bpy.types.Context, _values: bpy.types.OperatorProperties) -> str:
+        found = next(filter(None, map(kept.before, sinew_targets(context))), None)
+        return tip(cls.bl_description) if found is None else tr(found.label)
+
+    def run(self, context: bpy.types.Context) -> None:
+        with session.changing(context):
+            for obj in sinew_targets(context):
+                kept.use_before(obj)
+
+
+def _draw_before(self: bpy.types.Panel, context: bpy.types.Context) -> None:
+    """At the end of the character's variants."""
+    if any(kept.before(obj) for obj in sinew_targets(context)):
+        self.layout.operator("sinew.use_before_bake", icon="LOOP_BACK")
+
+
+class SINEW_PT_bake(Sidebar, bpy.types.Panel):
     bl_label = "Bake and Export"
     bl_options = {"DEFAULT_CLOSED"}
 
-    def draw(self, _context: bpy.types.Context) -> None:
+    @classmethod
+    def poll(cls, context: bpy.types.Context) -> bool:
+        return has_sinew_targets(context) or any(map(kept.is_baked, targets(context)))
+
+    def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
+        # Meshes of one armature share them.
+        sentences = (kept.sentences_of(obj) for obj in targets(context))
+        for sentence in dict.fromkeys(chain.from_iterable(sentences)):
+            draw_text(layout, sentence, icon="CHECKMARK")
+        if not has_sinew_targets(context):
+            return
         layout.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
         layout.operator("sinew.export", text="Export\u2026", icon="EXPORT")
         draw_text(layout, "A bake into this file takes Sinew off", icon="INFO")
         layout.operator("sinew.corrective_key", icon="SHAPEKEY_DATA")
 
 
-FEATURE = Feature((SINEW_OT_bake, SINEW_PT_bake))
+FEATURE = Feature(
+    (kept.SinewBake, SINEW_OT_bake, SINEW_OT_use_before_bake, SINEW_PT_bake),
+    {"Object.sinew_bake": bpy.props.PointerProperty(type=kept.SinewBake)},
+    menus={"SINEW_PT_variants": _draw_before},
+)

@@ -35,6 +35,8 @@ _LAST_SWEEPS = 24
 _SWEEPS_WITHOUT_GAIN, _SMALL_GAIN = 4, 0.01
 _SMALLEST_WEIGHT = 1e-4
 _ROUNDING = 5e-7
+# What is less is not written as a number.
+_SHORTEST = 1e-4
 
 
 @dataclass(frozen=True)
@@ -88,7 +90,12 @@ class Errors:
 
     @property
     def texts(self) -> tuple[str, str]:
-        return f"{self.rms:.2g}", f"{self.worst:.2g}"
+        return _short(self.rms), _short(self.worst)
+
+
+def _short(value: float) -> str:
+    """Without an exponent."""
+    return f"{value:.2g}" if value >= _SHORTEST or value == 0.0 else f"< {_SHORTEST:g}"
 
 
 @dataclass(frozen=True)
@@ -159,8 +166,8 @@ class HelperOptions:
     )
     error: float = option(
         0.0,
-        "Error",
-        "No more helper bones are added once the rms error is this much of the meshes' diagonal; 0: all of "
+        "Enough at Error",
+        "No more helper bones are added once the error (RMS) is this much of the character's size; 0: all of "
         "them",
         kind="percent",
     )
@@ -243,7 +250,7 @@ class Report:
     def _sentence(self, unit: str) -> Phrase:
         (rms, worst), (rms_before, worst_before) = self.after.texts, self.before.texts
         size = self.diagonal or 1.0
-        shares = (f"{100.0 * each / size:.2g}%" for each in (self.after.rms, self.after.worst))
+        shares = (f"{_short(100.0 * each / size)} %" for each in (self.after.rms, self.after.worst))
         return phrase(
             "{name}: {count} helper bones; error {rms} {unit} rms, {worst} at most ({shares} of the diagonal)"
             "; linear blending had {rms_before} and {worst_before}",

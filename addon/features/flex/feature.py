@@ -244,7 +244,8 @@ def _draw_place(layout: bpy.types.UILayout, place: tuple[int, int], finding: Fin
     if limit.name != "inert":
         text = tr("{what}: {value}", what=text, value=f"{limit.number(finding.value)} {tr(limit.unit)}")
     row = layout.row(align=True)
-    row.label(text=text, translate=False)
+    buttons = bool(finding.pose) + bool(finding.mesh)
+    draw_text(row.column(), text, beside=buttons)
     if finding.pose:
         button = row.operator("sinew.flex_pose", text="", icon="ARMATURE_DATA")
         button.joint, button.finding = place

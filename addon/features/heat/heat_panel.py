@@ -175,7 +175,7 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         shown = {properties.of(obj).method for obj, _skinned in pairs}
         heads = ["", "At Rest", shown.pop() if len(shown) == 1 else "Shown"]
         if other is not None:
-            heads.append("Armature" if settings.other == properties.BLENDER else settings.other)
+            heads.append("Blender" if settings.other == properties.BLENDER else settings.other)
         column = self.layout.column(align=True)
         _draw_row(column, heads)
         for row in rows(context.scene, subject.measured, other):
@@ -212,7 +212,7 @@ def rows(scene: bpy.types.Scene, measured: Measured, other: Measured | None) -> 
         row("Most stretch", "stretch_max", "ratio", rest("ratio", 1.0)),
         row("Stretch, RMS", "stretch_rms", "share", rest("share", 0.0)),
         ("Flipped faces", "0", *(f"{each.entry('flipped_faces'):,}" for each in shapes)),
-        row("Collapse", "bulge_min", "length", rest("length", 0.0)),
+        row("Dent", "bulge_min", "length", rest("length", 0.0)),
         row("Bulge", "bulge_max", "length", rest("length", 0.0), True),
     ]
 

@@ -144,7 +144,7 @@ _OF_POSES = {
         "Three or more bones are rotated so far apart that dual quaternion skinning rotates the other way "
         "where a vertex's groups were assigned in another order, as copied or mirrored weights may be.",
         "Take the bone with the largest rotation off these vertices, spread the rotation over more bones, or "
-        "set Signs to Along the Chain.",
+        "set Rotation Path to Along the Chain.",
     ),
     "near_half_turn": (
         "Close to 180 degrees between bones",
@@ -156,7 +156,7 @@ _OF_POSES = {
         "Dual quaternions change hemisphere in the action",
         "A bone rotates past 180 degrees against the others: from one frame to the next, dual quaternion "
         "skinning jumps to the other direction of rotation.",
-        "Spread the rotation over twist bones, keep it below 180 degrees, set Signs to Along the Chain, or "
+        "Spread the rotation over twist bones, keep it below 180 degrees, set Rotation Path to Along the Chain, or "
         "use linear blend here.",
     ),
 }

@@ -65,11 +65,11 @@ CRITERIA = (
     ),
     Criterion(
         "crossings",
-        "Crossings",
+        "Self-Intersections",
         "",
         "count",
-        "crosses itself least",
-        "How many triangles cross others that they do not at rest",
+        "intersects itself least",
+        "How many triangles go through others that they do not at rest",
     ),
 )
 LONGEST = "longest"

@@ -17,8 +17,9 @@ from ...ui.sidebar import Sidebar
 from ...ui.translations import tr
 from . import stored
 
+AS_BLENDER = "As Blender"
 # Those that every character has.
-ALWAYS = (parse(f"As Blender={BLENDER}"), *(parse(name) for name in PRESETS))
+ALWAYS = (parse(f"{AS_BLENDER}={BLENDER}"), *(parse(name) for name in PRESETS))
 
 ACTIONS = (
     ("RENAME", "Rename\u2026", "Give it a name of its own", "NONE", 0),
