@@ -115,9 +115,9 @@ def _lines(text: str, width: float) -> Iterator[str]:
     blf.size(0, bpy.context.preferences.ui_styles[0].widget.points)
     line = ""
     for word in text.split():
-        if _width(word) > width:
-            # A name may be longer than a line; wrapped, it would look like two.
-            word = shortened(word, int(len(word) * width / _width(word)))
+        # A name may be longer than a line; wrapped, it would look like two.
+        while _width(word) > width and len(word) > 2:
+            word = shortened(word, len(word) - 1)
         longer = f"{line} {word}" if line else word
         if line and _width(longer) > width:
             yield line

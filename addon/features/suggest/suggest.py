@@ -52,27 +52,33 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     check_measurable(objects)
     of_choice, basis = (MeasuredOn.of(scene, objects, depth, over) for depth in (CHOICE, STAGES))
     choice = yield from as_part(recommend.search(scene, objects, over), 0.0, CHOOSING)
+    # The panel shows it while the rest is measured.
+    recommend.keep(scene, choice, of_choice)
+    drop_old(scene, objects)
+    yield CHOOSING
     counted = frames_to_count(frames)
     labels = {method.name: method.label for method in sinew.methods()}
     suggestion = Suggestion(
         labels | ({RECOMMENDED: "Recommended"} if choice.variant.stages else {}), frames, 0.0
     )
+    rest, at_rest = None, set()
     with stepped.kept_frame(scene, armatures):
         for count, frame in enumerate(frames):
             subject = measure_at(scene, objects, properties.BLENDER, frame)
-            at_rest = crossings(subject.gauge.rest) if frame in counted else None
+            # Shape keys change it, and nothing else.
+            if frame in counted and (rest is None or not np.array_equal(rest, subject.gauge.rest.points)):
+                rest, at_rest = subject.gauge.rest.points.copy(), crossings(subject.gauge.rest)
             suggestion.diagonal = subject.measured.rest.diagonal
             moment = live.Moment.of(subject)
             for number, method in enumerate(suggestion.methods, start=1):
                 measured = _measured(method, moment, choice)
                 _add(suggestion, method, frame, measured, choice)
-                if at_rest is not None:
+                if frame in counted:
                     new = len(crossings(measured.shape) - at_rest)
                     suggestion.add(method, "crossings", new, frame)
                 done = count + number / len(suggestion.methods)
                 yield CHOOSING + (1.0 - CHOOSING) * done / len(frames)
     suggestions[scene.session_uid] = Known(suggestion, choice, basis)
-    recommend.keep(scene, choice, of_choice)
 
 
 def drop_old(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object]) -> None:

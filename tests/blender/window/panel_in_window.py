@@ -29,16 +29,19 @@ ZIP, FOLDER = window.arguments()
 VIEW = (400, 500)
 # Positions in the sidebar.
 ADD, METHOD, SWITCH = (880, 125), (930, 128), (812, 151)
+COMPARE, ADD_ARROW = (830, 171), (1002, 125)
 # Headers of panels while all are closed; what Diagnostics has below its own.
 HEADER, DIAGNOSTICS = (850, 97), (850, 265)
 CHECK, MEND = (830, 322), (835, 473)
-SUGGEST_BUTTON = (970, 151)
+SUGGEST_BUTTON = (970, 171)
 # The header of Suggest, and the recommended method.
 SUGGEST, BEST = (850, 153), (880, 184)
 # The height of the status bar in pixels.
 STATUS_BAR = 24
 # Positions in the list of methods.
-RECOMMENDED, DUAL_QUATERNION = (955, 168), (955, 265)
+RECOMMENDED, DUAL_QUATERNION = (955, 168), (832, 303)
+# In that behind the arrow of Add.
+ADD_DUAL_QUATERNION = (906, 303)
 # Positions in the dialog of a comparison, which opens here.
 DIALOG, CENTRES_OF_ROTATION, LOG_MATRIX = (400, 400), (171, 470), (171, 577)
 faults: list[str] = []
@@ -172,6 +175,12 @@ def one_click_for_a_method() -> Iterator[None]:
     check("added as preferred", methods(), ["qv"] * 5)
     preferences.first_method = "AS_BEFORE"
     yield from undo()
+    yield from window.click(ADD_ARROW)
+    yield from window.click(ADD_DUAL_QUATERNION)
+    check("added by a method of the list", methods(), ["dq"] * 5)
+    window.press("ESC", ADD_DUAL_QUATERNION)
+    yield from window.wait()
+    yield from undo()
 
 
 def by_search_and_keys() -> Iterator[None]:
@@ -237,8 +246,9 @@ def comparison_by_clicks() -> Iterator[None]:
     check("compared", compared, ["dq", "log"])
     check("copies in view", copies_in_view())
     check("view moved", [*view.view_location, view.view_distance] != before)
-    with window.in_view3d("WINDOW"):
-        bpy.ops.sinew.end_comparison("EXEC_DEFAULT")
+    # Where its button was, the one that ends it is.
+    yield from window.click(COMPARE)
+    check("ended", scene().sinew_comparison.collection, None)
     check("view given back", np.allclose([*view.view_location, view.view_distance], before, atol=1e-5))
     with window.in_view3d("WINDOW"):
         bpy.ops.view3d.view_all()
@@ -424,6 +434,8 @@ def height_of_change(before: str, after: str) -> int:
 
 
 def menus() -> Iterator[None]:
+    window.move(VIEW)
+    yield
     window.photograph(FOLDER / "no-menu.png")
     with window.in_view3d("WINDOW"):
         bpy.ops.wm.call_menu(name="SINEW_MT_menu")

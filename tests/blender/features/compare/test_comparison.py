@@ -11,8 +11,8 @@ import scenes
 import sinew_addon
 import whole_file
 from program import run_sinew
-from sinew_addon.attach import attach, properties
-from sinew_addon.deform import characters
+from sinew_addon.attach import attach, normals, properties
+from sinew_addon.deform import characters, session
 from sinew_addon.features.compare import comparison_labels, comparison_state
 from sinew_addon.io import files
 from sinew_addon.ui import operators
@@ -513,3 +513,14 @@ def test_a_comparison_stays_with_what_is_left_of_its_character():
     bpy.context.view_layer.update()
     assert state() is not None
     assert set(copies(first)) == {"dq"}
+
+
+@pytest.mark.skipif(not normals.ARE_SUPPORTED, reason="Blender takes no normals that are given")
+def test_copies_are_no_reason_for_blender_to_compute_normals():
+    obj, _armature = scenes.skinned_arm("dq")
+    obj.data.shade_smooth()
+    properties.of(obj).normals = properties.BY_SINEW
+    assert session.plan_of(obj).normals_reason == ""
+    compare(obj, {"lbs", "cor"})
+    bpy.context.scene.frame_set(5)
+    assert (session.plan_of(obj).normals_reason, session.plan_of(obj).normals.domain) == ("", "POINT")

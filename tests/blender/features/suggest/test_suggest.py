@@ -50,6 +50,15 @@ def test_numbers_are_those_of_each_method():
     assert "lbs" not in suggestion.best(next(c for c in CRITERIA if c.name == "volume"))
 
 
+def test_the_recommendation_is_known_before_all_methods_are_measured():
+    obj, _armature = scenes.skinned_arm("lbs")
+    uid = bpy.context.scene.session_uid
+    scan = suggest.scan(bpy.context.scene, [obj], "SCENE")
+    assert next(share for share in scan if uid in recommend.choices) < 0.6
+    assert uid not in suggest.suggestions
+    scan.close()
+
+
 def test_one_combination_is_recommended_and_a_click_uses_it():
     """The same one as by Recommended, measured in a row of its own."""
     obj, _armature = test_recommended.arm(143.0, axis=1, sides=16, rings=41)
