@@ -43,8 +43,8 @@ SHEETS = {
     ),
 }
 
-# In which it is bent by some 130 degrees, and where the joint is in a picture of 512 pixels: left, top, right,
-# bottom.
+# In which it is bent by some 130 degrees, and where the joint is in a picture of 512 pixels: left, top, right
+# and bottom.
 ELBOW_FRAME, ELBOW = 21, (212, 102, 500, 390)
 
 
