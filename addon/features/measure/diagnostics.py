@@ -156,8 +156,8 @@ _OF_POSES = {
         "Dual quaternions change hemisphere in the action",
         "A bone rotates past 180 degrees against the others: from one frame to the next, dual quaternion "
         "skinning jumps to the other direction of rotation.",
-        "Spread the rotation over twist bones, keep it below 180 degrees, set Rotation Path to Along the Chain, "
-        "or use linear blend here.",
+        "Spread the rotation over twist bones, keep it below 180 degrees, set Rotation Path to Along the "
+        "Chain, or use linear blend here.",
     ),
 }
 

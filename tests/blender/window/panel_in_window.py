@@ -358,6 +358,8 @@ def mends_by_clicks() -> Iterator[None]:
     bpy.ops.ed.undo_push(message="removed")
     check("weights lost", without_weights(), 20)
     yield from window.click(CHECK)
+    # The panels below move to their places.
+    yield from window.wait()
     yield from window.click(MEND)
     check("weights mended", without_weights(), 0)
     yield from undo()
