@@ -17,7 +17,6 @@ from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
 from ..skinning.variants import SYNTAX, parse_list
-from . import contact_sheet
 from .arguments import (
     add_engine,
     add_files,
@@ -99,6 +98,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write a contact sheet: the joints of the character bent in stated poses, a row for each "
         f"variant (default: {SHEET})",
     )
+    parser.add_argument(
+        "--difference",
+        action="store_true",
+        help="of a contact sheet: colour all rows after the first by how far each place is from the first",
+    )
     add_set(parser)
 
 
@@ -108,6 +112,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     if args.sheet is not None:
         return _run_sheet(args, console)
+    if args.difference:
+        raise WrongUse("--difference colours a contact sheet: it goes with --sheet")
     named = USUAL_METHODS if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference], PRESETS)
@@ -142,7 +148,6 @@ def _run_sheet(args: argparse.Namespace, console: Console) -> int:
     if len(args.files) > 1:
         raise WrongUse(f"{args.sheet}: --sheet writes the sheet of a single file")
     _check_variants(args)
-    contact_sheet.require_pillow()
     try:
         return 0 if _write_sheet(args.files[0], args, console) else 1
     except SinewError as error:
@@ -155,7 +160,9 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
     import bpy
 
     from ..deform import characters
-    from ..features.pages import contact_sheet as drawn
+    from ..features.pages import contact_sheet, sheet_picture
+    from ..features.pages.pictures import write_picture
+    from ..features.pages.sheet import Sheet
     from ..io import files
 
     console.note_on(path, files.open_file(path))
@@ -167,12 +174,14 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
         console.complain(f"{path}: left out: {reason}")
     rows = [characters.with_presets(own[each]) for each in variants]
     console.note_on(path, characters.sentences())
-    joints = drawn.columns(meshes)
+    joints, size = contact_sheet.columns(meshes), args.size or 240
+    labels = [each.title for each in variants]
+    sheet = Sheet(path.stem, labels, contact_sheet.headings(joints), is_difference=args.difference)
     count = len(rows) * len(joints)
-    steps = drawn.cells(joints, rows, args.size or 240)
-    cells = list(console.progress(steps, count, f"Drawing {path.name}"))
-    columns = [(joint.joint, joint.pose.name) for joint in joints]
-    contact_sheet.write(args.sheet, path.stem, [each.title for each in variants], columns, cells)
+    for cell in console.progress(contact_sheet.cells(joints, rows, size), count, f"Drawing {path.name}"):
+        sheet.add(cell)
+    ticks = contact_sheet.ticks(bpy.context.scene, sheet.scale)
+    write_picture(args.sheet, sheet_picture.compose(sheet, size, ticks))
     console.say(str(args.sheet))
     return not left_out
 

@@ -7,7 +7,6 @@ Shapes are computed and drawn beside Blender's evaluation: the file, its pose an
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import bpy
@@ -16,29 +15,22 @@ import sinew
 
 from ...attach import properties
 from ...base.errors import SinewError
+from ...io import units
 from ...skinning.variants import Variant
 from ...skinning.vectors import unit
 from ..measure import live, motion_range
+from ..measure.heat_scale import HeatScale
 from ..measure.joint_figures import Figures
 from ..measure.motion_range import Column
 from ..measure.rigs import Rig, posed, rigs_of
 from . import shaded
+from .sheet import Cell
 from .views import View, joint_view
 
 # How far around a joint a picture shows, in mean lengths of the two limbs that meet there.
 REACH = 1.0
 # A joint that bends less of the surface than this share of all is not worth a column.
 LEAST_BENT = 2e-4
-
-
-@dataclass(frozen=True)
-class Cell:
-    """pixels: float32 [size, size, 4], RGBA in 0..1, from the bottom row up"""
-
-    row: int
-    column: int
-    pixels: np.ndarray
-    figures: Figures
 
 
 # Joints of limbs, which are seen without the rest of the body.
@@ -149,6 +141,17 @@ def columns(objects: Sequence[bpy.types.Object]) -> list[Bent]:
     return found
 
 
+def headings(joints: Sequence[Bent]) -> list[tuple[str, str]]:
+    """As Sheet.columns has them."""
+    return [(joint.joint, joint.pose.name) for joint in joints]
+
+
+def ticks(scene: bpy.types.Scene, scale: HeatScale) -> tuple[str, str]:
+    """The least and the most of a sheet's colours, with units."""
+    least, most = (units.text(scene, scale.metric.unit, value, short=True) for value in scale.ticks(2))
+    return least, f"\u2265 {most}" if scale.clipped else most
+
+
 def cells(
     joints: Sequence[Bent], rows: Sequence[Mapping[bpy.types.Object, Variant]], size: int
 ) -> Iterator[Cell]:
@@ -157,13 +160,16 @@ def cells(
     rows  by object, the variant that it has
     size  pixels of a picture
     """
+    first: list[np.ndarray] = []
     for row, of_objects in enumerate(rows):
         for column, bent in enumerate(joints):
             variants = [of_objects[own.part.obj] for own in bent.moment.inputs]
             measured = bent.moment.measured_under(variants)
-            figures = Figures.of(measured, bent.limbs)
-            if np.isfinite(measured.shape.points).all():
-                pixels = shaded.draw(measured.shape, bent.view, size, bent.shown)
-            else:
-                pixels = np.zeros((size, size, 4), np.float32)
-            yield Cell(row, column, pixels, figures)
+            points = measured.shape.points
+            if row == 0:
+                first.append(points)
+            picture = shaded.empty(size)
+            if np.isfinite(points).all():
+                distances = np.linalg.norm(points - first[column], axis=0)
+                picture = shaded.picture(measured.shape, bent.view, size, bent.shown, distances)
+            yield Cell(row, column, picture, Figures.of(measured, bent.limbs), bent.view.width)
