@@ -16,7 +16,7 @@ from ..features.measure.diagnostics import USUAL_INFLUENCES
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
-from ..skinning.variants import SYNTAX, parse_list
+from ..skinning.variants import SYNTAX, USUAL, parse_list
 from .arguments import (
     add_engine,
     add_files,
@@ -36,7 +36,7 @@ if TYPE_CHECKING:
     from ..features.measure.subjects import Subject
 
 
-SHEET = "blender, dq, cor, dq+twist_spread+bulge_limit, dq+twist_spread+delta_mush, recommended"
+SHEET = f"blender, {USUAL}, recommended"
 SUMMARY = "show and measure methods beside each other"
 HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "

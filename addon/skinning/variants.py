@@ -38,6 +38,9 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
 _STAGES = {stage.name: stage for stage in sinew.stages()}
 _GROUPS = {name for name, each in parameters.by_full_name().items() if each.kind == "vertex_group"}
 
+USUAL = "dq, cor, dq+twist_spread+bulge_limit, dq+twist_spread+delta_mush"
+"""What a character is compared under that has no variants of its own."""
+
 SYNTAX = (
     "METHOD[+STAGE]..., such as dq+twist_spread+delta_mush:iterations=10, and mix=METHOD for the mix; "
     "+scale_rule=RULE, +normals=WHO; blender, file or recommended alone; NAME= in front names it"

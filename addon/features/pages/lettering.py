@@ -58,11 +58,11 @@ class Letters:
         points, triangles = self._read(letter)
         wide = int(np.ceil((ABOVE + BELOW) * self.size * SIZE)) + 1
         across = wide * SAMPLES
-        whole = np.zeros(across * across, np.float32)
+        whole, seen = np.zeros(across * across, np.float32), np.zeros((3, points.shape[1]))
+        seen[:2] = points[:2] * self.size * SIZE * SAMPLES - 0.5
+        seen[1] += BELOW * self.size * SAMPLES
+        triangles = triangles[:, shaded.are_wide(seen[:2, triangles])]
         if triangles.size:
-            seen = np.zeros((3, points.shape[1]))
-            seen[:2] = (points[:2] * self.size * SIZE) * SAMPLES - 0.5
-            seen[1] += BELOW * self.size * SAMPLES
             whole[shaded.nearest(seen, triangles, across)[0]] = 1.0
         return whole.reshape(wide, SAMPLES, wide, SAMPLES).mean(axis=(1, 3))[::-1]
 

@@ -124,8 +124,13 @@ def _corners_in(places: np.ndarray, shape: Shape, across: int, shown: np.ndarray
     points = places[:, corners]
     low, high = points.min(axis=1), points.max(axis=1)
     is_in = ((high >= 0.0) & (low <= across - 1)).all(axis=0)
+    return corners[:, is_in & are_wide(points)]
+
+
+def are_wide(points: np.ndarray) -> np.ndarray:
+    """bool [n]: triangles [2, 3, n] that are no lines."""
     (ax, bx, cx), (ay, by, cy) = points
-    return corners[:, is_in & (np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) > 1e-9)]
+    return np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) > 1e-9
 
 
 def nearest(seen: np.ndarray, corners: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -10,11 +10,11 @@ from typing import NamedTuple, Self
 GAP = 6
 # Pixels of a picture: the least in which figures are read, what is large enough to scroll rather than to
 # shrink it, and the most.
-LEAST, ENOUGH, MOST = 108, 140, 400
+LEAST, ENOUGH, MOST = 92, 140, 400
 # Pixels of the least letters: of labels and of figures. Both grow with the pictures.
 LABEL, FIGURE = 12, 11
-# The height of a line, and the width of a figure with its unit, as parts of a letter's size.
-LINE, WIDE = 1.35, 6.8
+# The height of a line, and the width of a figure, as parts of a letter's size; how many figures there are.
+LINE, WIDE, FIGURES = 1.35, 8.0, 4
 
 
 class Box(NamedTuple):
@@ -80,9 +80,9 @@ class Layout:
         return round(LINE * self.small_letters)
 
     @property
-    def is_narrow(self) -> bool:
-        """Whether there is no room for the unit behind each figure."""
-        return self.size < 2 * WIDE * self.small_letters
+    def in_line(self) -> int:
+        """How many figures are beside each other."""
+        return 1 if self.size < 2 * WIDE * self.small_letters else 2
 
     @property
     def label_width(self) -> int:
@@ -95,7 +95,7 @@ class Layout:
 
     @property
     def row_height(self) -> int:
-        return self.size + 2 * self.small_line + 3 * GAP
+        return self.size + FIGURES // self.in_line * self.small_line + 3 * GAP
 
     @property
     def width(self) -> int:
@@ -119,10 +119,10 @@ class Layout:
         return Box(self._left(column), self._top(row), self.size, self.size)
 
     def figure(self, row: int, column: int, number: int) -> Box:
-        """Two are in a line."""
-        x = self._left(column) + (number % 2) * self.size / 2
-        y = self._top(row) + self.size + GAP / 2 + (number // 2) * self.small_line
-        return Box(x, y, self.size / 2, self.small_line)
+        line, place = divmod(number, self.in_line)
+        x = self._left(column) + place * self.size / self.in_line
+        y = self._top(row) + self.size + GAP / 2 + line * self.small_line
+        return Box(x, y, self.size / self.in_line, self.small_line)
 
     def hit(self, x: float, y: float) -> Hit | None:
         """What is at a place: a picture with its figures, or a row's label."""
@@ -142,6 +142,38 @@ class Layout:
         return self.head + row * self.row_height
 
 
+@dataclass(frozen=True)
+class Panned:
+    """A layout that is seen through a room, whose upper part always has the heads of the columns.
+
+    room       what of a region is free, from its left and its top
+    left, top  where the sheet is in the room
+    """
+
+    layout: Layout
+    room: Box
+    left: float = 0.0
+    top: float = 0.0
+
+    def moved(self, right: float, down: float) -> Self:
+        """The same, moved as far as there is something to see; in the middle where all is seen."""
+        lefts, tops = self.room.width - self.layout.width, self.room.height - self.layout.height
+        left = lefts / 2 if lefts > 0 else min(max(self.left + right, lefts), 0.0)
+        return replace(self, left=left, top=min(max(self.top + down, min(tops, 0.0)), 0.0))
+
+    def zoomed(self, factor: float, x: float, y: float) -> Self:
+        """The same, larger by a factor; what is at a place of the region stays there."""
+        layout = self.layout.zoomed(factor)
+        factor, x, y = layout.size / self.layout.size, x - self.room.left, y - self.room.top
+        left, top = x - factor * (x - self.left), y - factor * (y - self.top)
+        return replace(self, layout=layout, left=left, top=top).moved(0.0, 0.0)
+
+    def hit(self, x: float, y: float) -> Hit | None:
+        """What is at a place of the region, from its left and its top."""
+        x, y = x - self.room.left, y - self.room.top
+        return None if y < self.layout.head else self.layout.hit(x - self.left, y - self.top)
+
+
 def wrapped(text: str, width: float, width_of: Callable[[str], float]) -> list[str]:
     """Returns the lines of a text, broken between words."""
     lines: list[str] = []
@@ -154,7 +186,7 @@ def wrapped(text: str, width: float, width_of: Callable[[str], float]) -> list[s
     return lines
 
 
-def figure_text(name: str, value: float, is_signed: bool, is_narrow: bool) -> str:
+def figure_text(name: str, value: float, is_signed: bool) -> str:
     """name: of a figure, as it is read"""
-    sign, unit = "+" if is_signed else "", "" if is_narrow else " %"
-    return f"{name} {100 * value:{sign}.0f}{unit}"
+    sign = "+" if is_signed else ""
+    return f"{name} {100 * value:{sign}.0f} %"

@@ -9,7 +9,7 @@ import numpy as np
 
 from ...ui.translations import tr
 from .lettering import Letters, letters
-from .sheet import BEST, CLOTH, FAINT, INK, PAPER, Sheet, legend
+from .sheet import BEST, CLOTH, FAINT, INK, PAPER, Sheet, colours
 from .sheet_layout import GAP, Box, Layout, figure_text, wrapped
 
 Canvas = np.ndarray
@@ -50,15 +50,13 @@ def compose(sheet: Sheet, size: int, ticks: Sequence[str]) -> np.ndarray:
 def _draw_cells(canvas: Canvas, sheet: Sheet, layout: Layout, small: Letters) -> None:
     scale, marks = sheet.scale, [sheet.best(column) for column in range(layout.columns)]
     for (row, column), cell in sheet.cells.items():
-        part = _part(canvas, layout.picture(row, column))
-        pixels = sheet.pixels(cell, scale)[::-1]
-        part += pixels[..., 3:] * (pixels[..., :3] - part)
+        _part(canvas, layout.picture(row, column))[:] = sheet.pixels(cell, scale)[::-1, :, :3]
         for number, (name, value) in enumerate(cell.figures._asdict().items()):
             box, is_best = layout.figure(row, column, number), name in marks[column][row]
             colour = BEST if is_best else FAINT
             if is_best:
                 _draw_dot(canvas, box, layout.small_letters)
-            text = figure_text(tr(name), value, name == "volume", layout.is_narrow)
+            text = figure_text(tr(name), value, name == "volume")
             small.draw(canvas, box.left + 0.7 * layout.small_letters, box.top, text, colour)
 
 
@@ -78,7 +76,7 @@ def _draw_legend(canvas: Canvas, title: Box, sheet: Sheet, ticks: Sequence[str],
     width = round(0.12 * title.width)
     right = title.left + title.width - small.width(most)
     bar = Box(right - GAP - width, title.top + 2, width, title.height - 4)
-    _part(canvas, bar)[:] = legend(width)
+    _part(canvas, bar)[:] = colours(np.linspace(0.0, 1.0, width))
     small.draw(canvas, right, title.top, most, FAINT)
     left = bar.left - GAP - small.width(least)
     small.draw(canvas, left, title.top, least, FAINT)
