@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 
 import bpy
 
@@ -23,12 +23,6 @@ from ..variants import choices, keys
 from . import look, overlay, rows
 
 IMAGE = "Contact Sheet"
-KEYS = (
-    "Click: use this variant and go there \u00b7 1 to 9: use a variant \u00b7 D: difference to the first \u00b7 "
-    "wheel: scroll, with Ctrl: zoom \u00b7 Esc: close"
-)
-KEYS_DRAWING = "Esc: stop drawing \u00b7 " + KEYS.rpartition(" \u00b7 ")[0]
-KEYS_LOOKING = "{joint}: {pose}, {variant} \u00b7 1 to 9: use a variant \u00b7 Backspace or Esc: back to the sheet"
 WHEEL = {"WHEELUPMOUSE": 1, "WHEELDOWNMOUSE": -1}
 # A turn of the wheel zooms by this factor, or scrolls by so many pixels.
 ZOOM, SCROLL = 1.15, 60.0
@@ -168,12 +162,27 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
         if ticks != shown.ticks:
             shown.ticks = ticks
             shown.forget_all()
-        shown.hint = tr(KEYS if self.left is None else KEYS_DRAWING)
-        if shown.is_looking:
-            names = self.sheet.columns[self.column]
-            used = self.sheet.rows[shown.used] if shown.used >= 0 else tr("other settings")
-            shown.hint = tr(KEYS_LOOKING, joint=tr(names[0]), pose=tr(names[1]), variant=used)
+        shown.hint = self._hint()
         self.area.tag_redraw()
+
+    def _hint(self) -> str:
+        """What keys do."""
+        used = self.shown.used
+        if not self.shown.is_looking:
+            text = (
+                "Click: use this variant, and go there \u00b7 1 to 9: use a variant \u00b7 D: difference to "
+                "the first \u00b7 wheel: scroll, with Ctrl: zoom \u00b7 Esc: close"
+                if self.left is None
+                else "Esc: stop drawing \u00b7 click: use this variant, and go there"
+            )
+            return tr(text)
+        joint, pose = map(tr, self.sheet.columns[self.column])
+        return tr(
+            "{joint}: {pose}, {variant} \u00b7 1 to 9: use a variant \u00b7 Backspace, Esc: to the sheet",
+            joint=joint,
+            pose=pose,
+            variant=self.sheet.rows[used] if used >= 0 else tr("other settings"),
+        )
 
     def _keep(self, context: bpy.types.Context, size: int) -> None:
         """Makes the image of what is drawn."""
@@ -181,7 +190,8 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
         pixels = sheet_picture.compose(self.sheet, size, ticks)
         height, width = pixels.shape[:2]
         image = bpy.data.images.get(IMAGE)
-        if image is None or image.library is not None or image.source != "GENERATED":
+        # One that the artist has saved as a file stays.
+        if image is None or image.packed_file is None:
             image = bpy.data.images.new(IMAGE, width, height)
         image.scale(width, height)
         image.pixels.foreach_set(pixels.ravel())

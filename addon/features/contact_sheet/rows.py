@@ -9,7 +9,7 @@ import bpy
 from ...attach import properties, property_groups, variant_settings
 from ...base.errors import SinewError
 from ...deform import session
-from ...skinning.variants import FILE, WHOLE, BLENDER, Variant, named, parse_list
+from ...skinning.variants import BLENDER, FILE, WHOLE, Variant, named, parse_list
 from ...ui import character
 from ...ui.operators import sinew_targets
 from ..pages.contact_sheet import Bent, columns

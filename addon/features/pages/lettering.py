@@ -38,8 +38,10 @@ class Letters:
         for letter in text:
             cover, wide = self._letter(letter)
             x, y = round(left), round(top)
-            part = pixels[max(y, 0) : y + len(cover), max(x, 0) : x + len(cover)]
-            share = cover[: part.shape[0], : part.shape[1], None]
+            part = pixels[max(y, 0) : max(y + len(cover), 0), max(x, 0) : max(x + len(cover), 0)]
+            # It may be cut off at any side.
+            seen = cover[max(-y, 0) :, max(-x, 0) :]
+            share = seen[: part.shape[0], : part.shape[1], None]
             part += share * (np.array(colour, np.float32) - part)
             left += wide
 

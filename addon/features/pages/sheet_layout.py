@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Where the parts of a contact sheet are, in pixels from its left and its top: drawn as a picture, or over a view."""
+"""Where the parts of a contact sheet are, in pixels from its left and top: in a picture, or over a view."""
 
 from __future__ import annotations
 
@@ -162,10 +162,10 @@ class Panned:
         return replace(self, left=left, top=min(max(self.top + down, min(tops, 0.0)), 0.0))
 
     def zoomed(self, factor: float, x: float, y: float) -> Self:
-        """The same, larger by a factor; what is at a place of the region stays there."""
-        layout = self.layout.zoomed(factor)
-        factor, x, y = layout.size / self.layout.size, x - self.room.left, y - self.room.top
-        left, top = x - factor * (x - self.left), y - factor * (y - self.top)
+        """The same, larger by a factor; what is at a place of the region stays near it."""
+        layout, x, y = self.layout.zoomed(factor), x - self.room.left, y - self.room.top
+        wider, higher = layout.width / self.layout.width, layout.height / self.layout.height
+        left, top = x - wider * (x - self.left), y - higher * (y - self.top)
         return replace(self, layout=layout, left=left, top=top).moved(0.0, 0.0)
 
     def hit(self, x: float, y: float) -> Hit | None:

@@ -73,7 +73,7 @@ def _draw_legend(canvas: Canvas, title: Box, sheet: Sheet, ticks: Sequence[str],
     """At the right end of the title's line."""
     text = tr("Difference to {first}", first=sheet.rows[0])
     least, most = ticks
-    width = round(0.12 * title.width)
+    width = max(round(0.12 * title.width), 40)
     right = title.left + title.width - small.width(most)
     bar = Box(right - GAP - width, title.top + 2, width, title.height - 4)
     _part(canvas, bar)[:] = colours(np.linspace(0.0, 1.0, width))

@@ -32,8 +32,8 @@ def use(variant: Variant) -> None:
 class SINEW_OT_variant_keys(OnSinewObjects, bpy.types.Operator):
     bl_label = "Variant Keys"
     bl_description = (
-        "Until Esc, the keys 1 to 9 in the 3D view use the variants of the character, each one undo step; all "
-        "else works as before"
+        "Until Esc, the keys 1 to 9 in the 3D view use the variants of the character, each one undo step; "
+        "all else works as before"
     )
     bl_options = {"REGISTER"}
 
