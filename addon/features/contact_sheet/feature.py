@@ -26,6 +26,8 @@ IMAGE = "Contact Sheet"
 WHEEL = {"WHEELUPMOUSE": 1, "WHEELDOWNMOUSE": -1}
 # A turn of the wheel zooms by this factor, or scrolls by so many pixels.
 ZOOM, SCROLL = 1.15, 60.0
+# Between two redraws, so that the first row is soon seen.
+MOST_SECONDS = 0.5
 # What moves a view.
 NAVIGATION = {
     *("MIDDLEMOUSE", "WHEELUPMOUSE", "WHEELDOWNMOUSE", "TRACKPADPAN", "TRACKPADZOOM", "MOUSEROTATE"),
@@ -138,7 +140,7 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
             self.area.tag_redraw()
         elif self.left is not None and not self.shown.is_looking:
             now = time.perf_counter()
-            until = now + stepped.seconds_between_redraws(now - self.drawn_from)
+            until = now + min(stepped.seconds_between_redraws(now - self.drawn_from), MOST_SECONDS)
             while self.left is not None and time.perf_counter() < until:
                 self._take(next(self.left, None))
             self.drawn_from = time.perf_counter()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Part of features_in_window.py: a contact sheet over the view by clicks and keys; variants by number keys."""
+"""Part of features_in_window.py: a contact sheet over the view by clicks and keys; variants by numbers."""
 
 from __future__ import annotations
 
