@@ -26,7 +26,7 @@ IMAGE = "Contact Sheet"
 WHEEL = {"WHEELUPMOUSE": 1, "WHEELDOWNMOUSE": -1}
 # A turn of the wheel zooms by this factor, or scrolls by so many pixels.
 ZOOM, SCROLL = 1.15, 60.0
-# Between two redraws, so that the first row is soon seen.
+# Between two redraws: pictures are to come one after the other.
 MOST_SECONDS = 0.5
 # What moves a view.
 NAVIGATION = {
@@ -143,6 +143,9 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
             until = now + min(stepped.seconds_between_redraws(now - self.drawn_from), MOST_SECONDS)
             while self.left is not None and time.perf_counter() < until:
                 self._take(next(self.left, None))
+                if len(self.sheet.cells) == len(self.joints):
+                    # The first row is seen at once.
+                    break
             self.drawn_from = time.perf_counter()
             self._refresh(context)
         return {"RUNNING_MODAL"}
