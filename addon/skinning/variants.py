@@ -219,6 +219,11 @@ def parse_list(text: str) -> list[Variant]:
     return list(dict.fromkeys(parse(each) for each in text.split(",")))
 
 
+def is_key(name: str) -> bool:
+    """Whether it is the key of a variant, and no method's name."""
+    return "=" in name
+
+
 def named(variant: Variant, name: str) -> Variant:
     """The same under another name. Raises WrongUse for one that the text could not have."""
     if re.search(r"[=+:,\n]", name):

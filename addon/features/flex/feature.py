@@ -9,24 +9,24 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...attach import properties
+from ...attach import properties, variant_settings
 from ...attach.feature import Feature
 from ...attach.layout import read as read_stack
 from ...attach.subscribers import subscribers
 from ...base.errors import SinewError
-from ...ui import operators, stepped
+from ...skinning.variants import Variant, parse
+from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import tr
 from ..diagnose import diagnose
 from ..measure.worst_frames import check_measurable
 from ..pages.save import SavesPage
+from ..variants import choices
 from . import flex, page
 from .limits import Table
 from .verdict import Finding, Joint
 
-# What is tried beside a character's own method.
-OTHERS = ("lbs", "dq", "cor")
 JOINTS_SHOWN = 8
 # How far the view is from a place, in sizes of the mesh.
 NEAR = 0.3
@@ -44,17 +44,17 @@ class SINEW_OT_flex(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     saying = "Sinew bends every joint"
 
     others: bpy.props.BoolProperty(
-        name="Try Methods",
-        description="Also try linear blending, dual quaternions and centres of rotation, and say which "
-        "mend a joint",
+        name="Try Variants",
+        description="Also try the other variants of the character, and say which mend a joint",
         options={"SKIP_SAVE"},
     )
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         objects = sinew_targets(context)
         check_measurable(objects)
-        shown = {properties.of(obj).method for obj in objects}
-        others = [name for name in OTHERS if self.others and {name} != shown]
+        shown = [variant_settings.read(obj) for obj in objects]
+        tried = choices.of_character(context) if self.others else ()
+        others = [each.key for each in tried if not all(map(each.agrees_with, shown))]
         self.result = yield from flex.flex(objects, others, Table(), {})
 
     def run(self, context: bpy.types.Context) -> None:
@@ -156,7 +156,7 @@ class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
         row = layout.row(align=True)
         if not stepped.draw_progress(row, "sinew.flex"):
             row.operator("sinew.flex", text="Bend Every Joint", icon="CON_ROTLIMIT")
-            row.operator("sinew.flex", text="Try Methods").others = True
+            row.operator("sinew.flex", text="Try Variants").others = True
         result = results.get(context.scene.session_uid)
         if result is None:
             return
@@ -169,8 +169,10 @@ class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
             layout.operator("sinew.save_flex", icon="URL")
         bad = [(number, joint) for number, joint in enumerate(result.verdict.joints) if not joint.is_good]
         told: set[str] = set()
+        lead = character.lead(context)
+        now = variant_settings.read(lead) if lead is not None else None
         for number, joint in bad[:JOINTS_SHOWN]:
-            _draw_joint(layout.box().column(), number, joint, told)
+            _draw_joint(layout.box().column(), number, joint, told, now)
         if len(bad) > JOINTS_SHOWN:
             draw_text(layout, "and {count} more: `sinew flex` lists all", count=len(bad) - JOINTS_SHOWN)
 
@@ -182,8 +184,13 @@ def _headline(result: flex.Result) -> str:
     )
 
 
-def _draw_joint(layout: bpy.types.UILayout, number: int, joint: Joint, told: set[str]) -> None:
-    """told: names of limits whose advice is above"""
+def _draw_joint(
+    layout: bpy.types.UILayout, number: int, joint: Joint, told: set[str], now: Variant | None
+) -> None:
+    """
+    told  names of limits whose advice is above
+    now   what deforms the character
+    """
     layout.label(text=joint.name, icon="BONE_DATA", translate=False)
     for place, finding in enumerate(joint.findings):
         limit = finding.limit
@@ -200,8 +207,10 @@ def _draw_joint(layout: bpy.types.UILayout, number: int, joint: Joint, told: set
             button = row.operator("sinew.flex_place", text="", icon="RESTRICT_SELECT_OFF")
             button.joint, button.finding = number, place
         if finding.mends:
-            names = ", ".join(tr(properties.METHODS[name].label) for name in finding.mends)
-            draw_text(layout, "Not under {methods}", icon="SOLO_ON", methods=names)
+            layout.label(text="Not under", icon="SOLO_ON")
+            column = layout.column(align=True)
+            for key in finding.mends:
+                choices.draw_use(column, parse(key), now)
         elif limit.name not in told:
             told.add(limit.name)
             draw_text(layout, tr(limit.meaning))
