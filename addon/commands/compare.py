@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -131,7 +132,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
         try:
             complete = True
             if args.viewer is not None:
-                complete = _write_viewer(path, methods, args, console)
+                write = _write_viewer if args.variants is None else _write_viewer_of_variants
+                complete = write(path, methods, args, console)
             if args.out is not None:
                 complete &= _compare(path, methods, engine, args, console)
         except SinewError as error:
@@ -192,7 +194,6 @@ def _check_variants(args: argparse.Namespace) -> None:
     others = {
         "--methods": args.methods is not None,
         "--set": bool(args.set),
-        "--viewer": args.viewer is not None,
     }
     for option in (option for option, is_given in others.items() if is_given):
         raise WrongUse(f"--variants names whole choices, which {option} does not take; leave one away")
@@ -233,12 +234,51 @@ def _write_viewer(path: Path, methods: list[str], args: argparse.Namespace, cons
     attached = viewer.attached_to(scene, meshes)
     of_each = dict.fromkeys(meshes, ())
     steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out)
-    with console.bar(f"Reading {path.name}", len(frames)) as show:
+    return _write_page(path, steps, len(frames), left_out, args.viewer, console)
+
+
+def _write_viewer_of_variants(
+    path: Path, _methods: list[str], args: argparse.Namespace, console: Console
+) -> bool:
+    """The same for variants, which have stages of their own."""
+    import bpy
+
+    from ..deform import characters
+    from ..features.pages import viewer
+    from ..io import files
+
+    console.note_on(path, files.open_file(path))
+    scene = bpy.context.scene
+    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
+    found = characters.deformed_meshes_of(scene, path, args.object)
+    own = {each: characters.own_variants(found, each) for each in args.variants}
+    meshes, left_out = characters.taken(found, path, [viewer.PLAYED])
+    rows = {
+        each.key: characters.with_presets({obj: variants[obj] for obj in meshes})
+        for each, variants in own.items()
+    }
+    console.note_on(path, characters.sentences())
+    attached = viewer.attached_to(scene, meshes)
+    of_each = dict.fromkeys(meshes, ())
+    steps = viewer.page(scene, path.stem, of_each, attached, list(rows), frames, left_out, variants=rows)
+    return _write_page(path, steps, len(frames), left_out, args.viewer, console)
+
+
+def _write_page(
+    path: Path,
+    steps: Generator[float, None, str],
+    count: int,
+    left_out: list[str],
+    target: Path,
+    console: Console,
+) -> bool:
+    """Returns False where a mesh was left out."""
+    with console.bar(f"Reading {path.name}", count) as show:
         text = result_of(steps, show)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
-    write_text(args.viewer, text)
-    console.say(str(args.viewer))
+    write_text(target, text)
+    console.say(str(target))
     return not left_out
 
 

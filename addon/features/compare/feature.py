@@ -222,10 +222,7 @@ class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
         attached = [obj for obj in meshes if obj not in of_each]
         armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in of_each))
         frames = stepped.frames_over(scene, armatures, self.over)
-        compared = comparison_state.methods_of(state)
-        methods = [name for name in compared if not is_key(name)]
-        if not methods:
-            raise SinewError("The page shows methods with the stages of the character: compare one, too")
+        methods = comparison_state.methods_of(state)
         with stepped.kept_frame(scene, armatures):
             return (yield from viewer.page(scene, title, of_each, attached, methods, frames))
 

@@ -103,7 +103,7 @@ class Mesh {
     this.restRows = wide(arrays.rest, arrays.shares);
     this.rest = way.array("float4", this.restRows, this.count);
     this.centres = way.array("float4", wide(arrays.centres || arrays.rest), this.count);
-    this.amounts = way.array("float2", arrays.amounts || new Float32Array(2 * this.count), this.count);
+    this.amounts = new Map();
     this.palette = way.array("float4", arrays.palettes.subarray(0, 4 * BONE * this.bones), BONE * this.bones, BONE);
     this.drawAround(arrays.triangles, arrays.edges);
     const target = () => way.array("float4", null, this.count);
@@ -162,17 +162,25 @@ class Mesh {
     this.rest.write(this.restRows);
   }
 
-  skin(method, most, target) {
-    const { blender, mix, hierarchy, form } = this.about, has = method === "mix" ? mix : method in METHODS;
-    const isOwn = has && (method !== "cor" || this.arrays.centres);
-    const [first, second] = (method === "mix" && mix || Array(2).fill(isOwn ? method : blender))
-      .map((name) => METHODS[name] + (isOwn && hierarchy.includes(name) ? HIERARCHY : 0));
-    const { number, influences } = this.influences(most);
-    way.run("skin", target, {
-      sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts: this.amounts, influences,
-    }, {
+  // How much each vertex gets of Twist Spread and of Limit Bulge, 0 to 1.
+  amountsOf(strengths) {
+    const key = strengths.join(), { masks } = this.arrays;
+    if (!this.amounts.has(key)) {
+      const own = masks ? masks.map((mask, k) => Math.min(Math.max(mask * strengths[k % 2], 0), 1)) : new Float32Array(2 * this.count);
+      this.amounts.set(key, way.array("float2", own, this.count));
+    }
+    return this.amounts.get(key);
+  }
+
+  skin(name, most, target) {
+    const { blender, looks } = this.about, { method, mix, by_hierarchy, strengths, form } = looks[name];
+    const isOwn = method !== "blender", isMixed = isOwn && mix && this.arrays.shares;
+    const [first, second] = (isOwn ? [method, isMixed ? mix : method] : [blender, blender])
+      .map((one) => METHODS[one] + (isOwn && by_hierarchy.includes(one) ? HIERARCHY : 0));
+    const { number, influences } = this.influences(most), amounts = this.amountsOf(strengths);
+    way.run("skin", target, { sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts, influences }, {
       SINEW_INFLUENCES: number, METHOD: first, SECOND_METHOD: second, BULGE_FORM: FORMS[form] ?? 0,
-      STAGES: isOwn && state.stages && this.arrays.amounts ? 1 : 0,
+      STAGES: isOwn && (state.stages || isVariant(name)) && strengths.some((x) => x > 0) && this.arrays.masks ? 1 : 0,
     });
   }
 
@@ -394,7 +402,9 @@ function changed() {
 
 const methodLabel = (name) => header.methods[name];
 const staged = [...new Set(header.parts.flatMap((part) => part.stages))], stagesLabel = staged.join(" and ");
-const hasStages = (name) => staged.length && state.stages && name !== "blender";
+// The key of a variant, which has stages of its own.
+const isVariant = (name) => name.includes("=");
+const hasStages = (name) => staged.length && state.stages && name !== "blender" && !isVariant(name);
 const shownLabel = (name) => methodLabel(name) + (hasStages(name) ? ` with ${stagesLabel}` : "");
 
 function say(text) {
