@@ -222,7 +222,7 @@ const state = {
 };
 const isWiped = () => state.panes === 2 && state.wipe !== null;
 // How many views are beside each other.
-const views = () => (isWiped() ? 1 : state.panes);
+const viewCount = () => (isWiped() ? 1 : state.panes);
 
 // Where the character is at a frame. One that walks away is followed; others stay where they are.
 function boxOver(frames) {
@@ -309,13 +309,13 @@ async function markOf(pane) {
 }
 
 function showMarks() {
-  const { clip_from_world } = camera(canvas.clientWidth / views() / canvas.clientHeight);
+  const { clip_from_world } = camera(canvas.clientWidth / viewCount() / canvas.clientHeight);
   for (const i of [0, 1]) {
     const mark = find(`mark-${i}`), place = marks[i] && moved(clip_from_world, [...marks[i].point, 1]);
     const [x, y] = place ? [place[0] / place[3], place[1] / place[3]] : [2, 2];
     const isCovered = isWiped() && (1 + x) / 2 < state.wipe !== (i === 0);
     mark.hidden = isCovered || !(Math.abs(x) < 1 && Math.abs(y) < 1 && place[3] > 0);
-    mark.style.left = `${50 * (1 + x + 2 * (isWiped() ? 0 : i)) / views()}%`;
+    mark.style.left = `${50 * (1 + x + 2 * (isWiped() ? 0 : i)) / viewCount()}%`;
     mark.style.top = `${50 * (1 - y)}%`;
   }
 }
@@ -337,7 +337,7 @@ function inPane(pane, aspect) {
 
 // The left edge and the width, in pixels, of what a pane draws, and of what is seen of it.
 function placesOf(pane, width) {
-  const each = Math.floor(width / views()), cut = Math.round(width * state.wipe);
+  const each = Math.floor(width / viewCount()), cut = Math.round(width * state.wipe);
   if (!isWiped()) return { port: [pane * each, each], seen: [pane * each, each] };
   return { port: [0, width], seen: pane ? [cut, width - cut] : [0, cut] };
 }
@@ -347,7 +347,7 @@ function draw(isSmooth = false) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   skinAll();
-  const aspect = Math.floor(width / views()) / height, panes = [0, 1].slice(0, state.panes);
+  const aspect = Math.floor(width / viewCount()) / height, panes = [0, 1].slice(0, state.panes);
   way.draw(panes.flatMap((pane) => inPane(pane, aspect).map((own) => ({ ...own, ...placesOf(pane, width) }))), isSmooth);
   showMarks();
 }
@@ -455,7 +455,7 @@ function show() {
     pane.hidden = i >= state.panes;
     pane.style.left = `${100 * (i + 0.5) / state.panes}%`;
   });
-  find("stage").classList.toggle("has-two", views() === 2);
+  find("stage").classList.toggle("has-two", viewCount() === 2);
   find("wipe").hidden = !isWiped();
   find("wipe").style.left = `${100 * state.wipe}%`;
   find("wipe").setAttribute("aria-valuenow", Math.round(100 * state.wipe));
@@ -516,7 +516,7 @@ async function choose(index) {
 
 // Along the normal, or as near to that as nothing is in between; some lengths of the bone around the place.
 async function viewOf({ point, normal }, size) {
-  const its = camera(canvas.clientWidth / views() / canvas.clientHeight);
+  const its = camera(canvas.clientWidth / viewCount() / canvas.clientHeight);
   const reach = Math.min(Math.max(1.6 * size, radius / 12), radius / 2);
   const [yaw, pitch] = [Math.atan2(normal[0], -normal[1]), Math.min(Math.max(Math.asin(normal[2]), -1), 1)];
   const views = [{ yaw, pitch }];
@@ -715,7 +715,7 @@ function connectCanvas() {
     const before = pointers.get(event.pointerId);
     if (!before) return;
     const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-    const shorter = Math.min(canvas.clientWidth / views(), canvas.clientHeight);
+    const shorter = Math.min(canvas.clientWidth / viewCount(), canvas.clientHeight);
     const other = [...pointers.values()].find((pointer) => pointer.pointerId !== event.pointerId);
     pointers.set(event.pointerId, event);
     if (other) {
