@@ -15,8 +15,6 @@ from ...ui.operators import sinew_targets
 from ..pages.contact_sheet import Bent, columns
 from ..variants import choices
 
-NOW = "Now"
-
 
 def rows(context: bpy.types.Context, text: str) -> list[Variant]:
     """Returns what the character can be deformed by at once.
@@ -32,7 +30,7 @@ def rows(context: bpy.types.Context, text: str) -> list[Variant]:
             raise SinewError(f"{each.method}: choose it for the character first, it is then a row")
     found = [now if each.method == FILE else each for each in found]
     if not text.strip() and not any(each.agrees_with(now) for each in found):
-        found.insert(1, named(now, NOW))
+        found.insert(1, named(now, choices.NOW))
     return found
 
 

@@ -13,7 +13,8 @@ from ...ui.translations import tr
 from ..suggest import recommend
 from . import stored
 
-AS_BLENDER = parse(f"As Blender={BLENDER}")
+AS_BLENDER = Variant.of(BLENDER, name="As Blender")
+RECOMMENDED, NOW = "Recommended", "Now"
 # Those that every character has.
 ALWAYS = (AS_BLENDER, *(parse(name) for name in PRESETS))
 
@@ -31,13 +32,14 @@ def _recommended(context: bpy.types.Context) -> list[Variant]:
         return []
     method = choice.variant.method
     whole = variant_settings.with_parameters(lead, method, choice.values)
-    return [replace(Variant.of_values(method, whole), name="Recommended")]
+    return [replace(Variant.of_values(method, whole), name=RECOMMENDED)]
 
 
 def label(variant: Variant) -> str:
     """In the user's language, but for names that the user gave."""
-    is_ours = variant in ALWAYS or variant.name == "Recommended"
-    return tr(variant.name) if variant.name and is_ours else variant.name or tr(variant.label)
+    if variant.name in (AS_BLENDER.name, RECOMMENDED, NOW):
+        return tr(variant.name)
+    return variant.name or tr(variant.label)
 
 
 def draw_use(layout: bpy.types.UILayout, variant: Variant, now: Variant | None) -> None:

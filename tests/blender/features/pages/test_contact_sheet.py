@@ -77,6 +77,13 @@ def test_the_command_writes_a_cell_for_each(tmp_path):
     # Clay in the cells, on their background.
     clay = (pixels[..., 0] - pixels[..., 2] > 8) & (pixels.sum(axis=2) > 90)
     assert clay.sum() > 2 * 96 * 96 * 0.1
+    coloured = tmp_path / "coloured.png"
+    options = "--variants", "blender, soft=dq+delta_mush:iterations=60", "--size", 96, "--difference"
+    run_sinew("compare", path, "--sheet", coloured, *options)
+    hues = np.ptp(np.asarray(Image.open(coloured).convert("RGB")).astype(int)[100:], axis=2)
+    assert (hues > 100).sum() > 100 > (np.ptp(pixels[100:], axis=2) > 100).sum()
+    wrong = run_sinew("compare", path, "--out", tmp_path, "--difference", status=2)
+    assert "it goes with --sheet" in wrong.stderr
     wrong = run_sinew("compare", path, "--sheet", sheet, "--frames", "1", status=2)
     assert "--frames does not go with it" in wrong.stderr
     wrong = run_sinew("compare", path, path, "--sheet", sheet, status=2)
