@@ -12,7 +12,6 @@ import zlib
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from html import escape
-from itertools import chain
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
 
@@ -90,7 +89,7 @@ class Stages:
     ) -> None:
         of = self.twists
         for strengths in {self.look.strengths, *(look.strengths for look in looks)}:
-            spread, limited = (self.masks * np.float32(strengths)).clip(0.0, 1.0).T
+            spread, limited = (self.masks * np.array(strengths, np.float32)).clip(0.0, 1.0).T
             twist = sinew.TwistSpread(
                 binding, of.rows, of.heads, of.tails, rest_bones, parents=of.parents, weights=spread, mix=mix
             )
@@ -101,8 +100,9 @@ class Stages:
         return self._made[look.strengths]
 
     def set_rest_points(self, points: np.ndarray) -> None:
-        for each in chain(*self._made.values()):
-            each.set_rest_points(points)
+        for twist, bulge in self._made.values():
+            twist.set_rest_points(points)
+            bulge.set_rest_points(points)
 
 
 @dataclass
@@ -190,8 +190,10 @@ class Part:
         turns   as sinew.Deformer.deform takes them
         """
         self._rests.append(self.rest if rest is None else rest)
-        for each in (*self._deformers.values(), *([] if self.stages is None else [self.stages])):
+        for each in self._deformers.values():
             each.set_rest_points(self._rests[-1])
+        if self.stages is not None:
+            self.stages.set_rest_points(self._rests[-1])
         # Not with numpy's product: see vectors.transformed().
         motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), self._rest_inverses)
         split = sinew.affine.split_scale(motions, self.rest_bones.astype(np.float64))
@@ -243,9 +245,10 @@ class Part:
         look = self.look(name)
         is_own = look.method != BLENDER
         first = look.method if is_own else self.blender
-        second = look.mix if is_own and look.mix and self.shares is not None else ""
+        shares = self.shares if is_own and look.mix else None
+        second = "" if shares is None else look.mix
         if name not in self._deformers:
-            mix = (second, self.shares) if second else None
+            mix = None if shares is None else (second, shares)
             self._deformers[name] = sinew.Deformer(self._binding, first, mix=mix)
             self._deformers[name].set_rest_points(self._rests[-1])
         signs = {f"{each}.signs": "hierarchy" for each in look.by_hierarchy if each in (first, second)}
