@@ -75,8 +75,9 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
             self._prepare(context)
         except SinewError as error:
             return self.failed(error)
-        self.region = next(region for region in area.regions if region.type == "WINDOW")
-        self.area, self.view = area, context.space_data.region_3d
+        # A button is in the sidebar, and a quad view has several.
+        regions = [region for region in (context.region, *area.regions) if region.type == "WINDOW"]
+        self.area, self.region, self.view = area, regions[0], regions[0].data
         self.eye, self.gizmos = look.Eye.of(self.view), context.space_data.show_gizmo
         self.posed, self.flight, self.dragged = look.Posed(context.scene), None, None
         context.space_data.show_gizmo = False

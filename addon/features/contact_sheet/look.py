@@ -51,9 +51,8 @@ class Eye:
         return cls(axes.to_quaternion(), Vector(wanted.target.tolist()), distance, "ORTHO")
 
     def show(self, view: bpy.types.RegionView3D) -> None:
-        view.view_perspective = self.perspective
         view.view_rotation, view.view_location = self.rotation, self.location
-        view.view_distance = self.distance
+        view.view_distance, view.view_perspective = self.distance, self.perspective
 
 
 @dataclass

@@ -6,6 +6,7 @@ from collections.abc import Sequence
 import bpy
 
 from ...attach import variant_settings
+from ...base.errors import SinewError
 from ...skinning.variants import Variant
 from ...ui import character
 from ...ui.operators import OnSinewObjects
@@ -46,13 +47,15 @@ class SINEW_OT_variant_keys(OnSinewObjects, bpy.types.Operator):
 
     def invoke(self, context: bpy.types.Context, _event: bpy.types.Event) -> set[str]:
         if context.area is None or context.area.type != "VIEW_3D":
-            self.report({"ERROR"}, tr("Press it in a 3D view"))
-            return {"CANCELLED"}
+            return self.execute(context)
         self.area = context.area
         SINEW_OT_variant_keys.is_on = True
         self._show(context)
         context.window_manager.modal_handler_add(self)
         return {"RUNNING_MODAL"}
+
+    def run(self, _context: bpy.types.Context) -> None:
+        raise SinewError("It listens to keys in a 3D view: press its button there")
 
     def modal(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         areas = context.window.screen.areas if context.window is not None else ()
