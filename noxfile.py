@@ -171,6 +171,7 @@ ENVIRONMENTS = [(f"bpy-{bpy}", LOCKS[bpy], python, True, True) for bpy, python i
 ENVIRONMENTS += [("bundle", LOCKS[EVERYDAY], EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [("site", "site", EVERYDAY_PYTHON, True, False)]
 ENVIRONMENTS += [("browsers", "browsers three", EVERYDAY_PYTHON, False, False)]
+ENVIRONMENTS += [("players", "players three babylon", EVERYDAY_PYTHON, False, False)]
 ENVIRONMENTS += [(name, name, EVERYDAY_PYTHON, False, False) for name in OTHERS]
 for _name, _locks, _version, _library, _addon in ENVIRONMENTS:
     _wheel = [f"wheel-{_version}"] * _library
@@ -508,6 +509,24 @@ def site(words: list[str]) -> int:
     return 0
 
 
+def findings(words: list[str]) -> int:
+    """Runs scripts of findings/, each to its end, and says at last which saw something else."""
+    known = {path.stem: path for path in sorted(Path("findings").glob("*.sh"))}
+    if unknown := [word for word in words if word not in known]:
+        sys.exit(f"dev: no finding {unknown[0]}: {', '.join(known)}")
+    pythons = [Path(python).parent for python in map(python_of, WHEEL_PYTHONS) if python]
+    os.environ["PATH"] = ":".join(map(str, (*pythons, os.environ["PATH"])))
+    changed = [name for name in words or known if say(f"finding {name}") or call("bash", known[name])]
+    return 1 if changed and not say(f"changed: {', '.join(changed)}") else 0
+
+
+def players(words: list[str]) -> int:
+    own = [bpy for bpy in (EVERYDAY, NEWEST) if python_of(BLENDERS[bpy])]
+    set_up(*[f"bpy-{bpy}" for bpy in own], "players")
+    known = [f"--bpy={bpy}={python_in(f'bpy-{bpy}')}" for bpy in own]
+    return call(f"{python_in('players')} tools/players/measure.py", *known, *words)
+
+
 def stub(words: list[str]) -> int:
     set_up("site")
     return call(f"{python_in('site')} tools/make_stub.py", *words)
@@ -564,7 +583,7 @@ PROGRAMS = {
 COMMANDS: dict[str, Callable[[list[str]], int]] = {
     **{name: functools.partial(in_blender, program=program) for name, program in PROGRAMS.items()},
     **{"demo": demo, "test": test, "bench": bench, "report": report, "site": site, "stub": stub},
-    **{"lint": lint, "package": package_command, "wheel": wheel},
+    **{"findings": findings, "players": players, "lint": lint, "package": package_command, "wheel": wheel},
     "release": lambda words: call(f"{sys.executable} -I tools/release.py", *words),
     "lock": lambda words: call(f"{sys.executable} tools/lock.py", *words),
 }

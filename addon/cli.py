@@ -61,7 +61,11 @@ class _Parser(argparse.ArgumentParser):
 
 def make_parser() -> tuple[argparse.ArgumentParser, dict[str, Command]]:
     """Returns the parser of the whole command line, and the module of each subcommand."""
-    modules = {name: cast(Command, import_module(f"{__package__}.commands.{name}")) for name in COMMANDS}
+    from .commands.console import discarded_output
+
+    # As a module, Blender 5.3 prints a line where the environment names a colour configuration (OCIO).
+    with discarded_output():
+        modules = {name: cast(Command, import_module(f"{__package__}.commands.{name}")) for name in COMMANDS}
     parser = _Parser(prog="sinew", description="Skinning for Blender files.")
     parser.add_argument("--verbose", action="store_true", help="show what Blender prints")
     subparsers = parser.add_subparsers(dest="command", required=True, metavar="COMMAND")

@@ -15,7 +15,7 @@ folder=$(mktemp -d)
 trap 'rm -rf "$folder"' EXIT
 python3.11 -m venv "$folder/venv"
 "$folder/venv/bin/pip" install --quiet bpy==4.5.15
-cat >"$folder/ball.py" <<'PYTHON'
+cat >"$folder/shown.py" <<'PYTHON'
 import bpy
 
 
@@ -57,5 +57,5 @@ seen = {source: round(height_of_the_ball(source), 1) for source in ("BASE", "DEF
 print(bpy.app.version_string, seen)
 raise SystemExit(seen != {"BASE": 1.3, "DEFORM": 1.3, "FINAL": 0.3})
 PYTHON
-"$folder/venv/bin/python" "$folder/ball.py"
+"$folder/venv/bin/python" "$folder/shown.py"
 echo "as seen on 2026-11-28"

@@ -49,7 +49,7 @@ def main() -> None:
         python = BLENDERS.get(name.removeprefix("bpy-"), "3.11")
         line = f"uv pip compile --quiet --upgrade --universal --python-version {python} --generate-hashes"
         line += " --no-emit-index-url --no-emit-find-links --no-header"
-        line += f"{' --no-deps' * name.startswith(('bpy-', 'three'))} --output-file"
+        line += f"{' --no-deps' * name.startswith(('bpy-', 'three', 'babylon'))} --output-file"
         words = [*line.split(), options.out / f"{name}.txt", f"requirements/{name}.in"]
         subprocess.run(words, cwd=FOLDER.parent, check=True)
 

@@ -15,10 +15,10 @@ import sinew_addon
 from bl_ui.utils import PresetPanel
 from sinew_addon import registration
 from sinew_addon.features.diagnose import mending
-from sinew_addon.features.flex import limits
+from sinew_addon.features.gltf import players
 from sinew_addon.features.gltf.export_check import CAUSES, NAMED, NORMALS
 from sinew_addon.features.heat import heat_panel
-from sinew_addon.features.measure import battery, joint_figures, metrics, motion_range, suggestion
+from sinew_addon.features.measure import battery, joint_figures, limits, metrics, motion_range, suggestion
 from sinew_addon.features.suggest import recommendation
 from sinew_addon.skinning.engines import METHODS
 from sinew_addon.skinning.vertex_data import PROVIDERS
@@ -103,6 +103,7 @@ def _of_lists() -> Iterator[str]:
     yield from joint_figures.Figures._fields
     yield from _of_each(mending.ALL.values(), "label", "description")
     yield from (*CAUSES.values(), *NAMED.values(), NORMALS)
+    yield from (*players.PROPERTIES.values(), *(each.note for each in players.PLAYERS.values() if each.note))
     yield from _of_each(PROVIDERS.values(), "what")
     yield from heat_panel._WORST.values()
     yield from _of_each(menus.entries(), "text")

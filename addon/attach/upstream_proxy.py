@@ -269,7 +269,7 @@ def copy_that_follows(obj: bpy.types.Object, name: str) -> bpy.types.Object:
 
 def _leave_simulations(copy: bpy.types.Object) -> None:
     """Takes a copy out of the collections of rigid bodies and their constraints, where Blender (4.2 to 5.3)
-    puts a copy of what is in them: it would be simulated, too."""
+    puts a copy of what is in them: it would be simulated, too (findings/copy_in_no_scene_is_simulated.sh)."""
     for world in (scene.rigidbody_world for scene in bpy.data.scenes):
         for collection in (world.collection, world.constraints) if world is not None else ():
             if collection is not None and copy.name_full in collection.objects:

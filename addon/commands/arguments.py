@@ -16,7 +16,7 @@ from ..base.output import file_to_write, folder_to_write
 from ..skinning import parameters
 from ..skinning.variants import Variant, parse_list
 
-FILES = ".blend, .glb, .gltf or .fbx"
+FILES = ".blend, .glb, .gltf, .fbx or .usd (.usda, .usdc, .usdz)"
 
 
 def count(text: str, least: int = 1) -> int:
@@ -159,10 +159,13 @@ def add_copies(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--overwrite", action="store_true", help="replace files that exist already")
 
 
-def add_options(parser: argparse.ArgumentParser, options: type, before: str = "") -> None:
+def add_options(
+    parser: argparse.ArgumentParser, options: type, before: str = "", chosen_by: Mapping[str, str] = {}
+) -> None:
     """Adds an argument for each option of a dataclass.
 
-    before  each one's help
+    before     each one's help
+    chosen_by  by the names of options that have no value unless they are given, what then chooses it
     """
     for name, (default, shown) in options_of(options).items():
         text = f"{before}{shown.text[:1].lower()}{shown.text[1:]}".replace("%", "%%")
@@ -182,6 +185,8 @@ def add_options(parser: argparse.ArgumentParser, options: type, before: str = ""
             known |= {"type": percent_or_none, "metavar": "PERCENT", "help": text}
         else:
             known |= {"type": count if shown.least else count_or_none, "metavar": "N"}
+        if name in chosen_by:
+            known |= {"default": None, "help": f"{text} (default: {default}, or what {chosen_by[name]})"}
         parser.add_argument(f"--{name.replace('_', '-')}", **known)
 
 

@@ -344,6 +344,7 @@ def _measure(
 ) -> Comparison:
     from ..deform import characters
     from ..features.measure import subjects
+    from ..features.measure.stray_weights import stray_weights
 
     methods = list(labels)
     batches = subjects.batches(subject, frames, len(methods) + 1)
@@ -353,6 +354,7 @@ def _measure(
         subjects.measure(subject, methods, args.reference, batch, measured)
         rest = rest or RestFacts.of(subject.gauge)
     assert rest is not None, "there is at least one frame"
+    stray = stray_weights([part.edited for part in subject.parts])
     return Comparison(
         path.name,
         [obj.name for obj in subject.meshes],
@@ -364,5 +366,8 @@ def _measure(
         measured.summaries,
         measured.times,
         measured.own,
-        {part.obj.name: part.edited.findings(args.influences) for part in subject.parts},
+        {
+            part.obj.name: [*own, *part.edited.findings(args.influences)]
+            for part, own in zip(subject.parts, stray, strict=True)
+        },
     )

@@ -184,6 +184,20 @@ class BatchProgress:
             self._console.note(f"[{self.done}/{self._total}] {line}")
 
 
+@contextmanager
+def discarded_output() -> Iterator[None]:
+    """Context in which nothing comes to standard output."""
+    sys.stdout.flush()
+    out, discard = os.dup(1), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(discard, 1)
+    os.close(discard)
+    try:
+        yield
+    finally:
+        os.dup2(out, 1)
+        os.close(out)
+
+
 def take_over_output() -> Console:
     """Reserves standard output and error for Sinew: what Blender prints is discarded.
 

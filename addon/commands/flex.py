@@ -15,8 +15,8 @@ from pathlib import Path
 from ..base.errors import WrongUse
 from ..base.output import folder_to_write, write_text
 from ..base.scratch import scratch_folder
-from ..features.flex.limits import Table, read_table
 from ..features.flex.report import Report, junit, lines, markdown, of_file
+from ..features.measure.limits import Table, read_table
 from ..jobs.inputs import files_of
 from ..jobs.journal import Journal, content_hash
 from . import batch

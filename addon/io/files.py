@@ -15,12 +15,13 @@ import numpy as np
 
 from ..base.errors import SinewError
 from ..base.output import remove, writing
-from . import read_only
+from . import read_only, usd
 
 IMPORTERS = {
     ".glb": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".gltf": lambda path: bpy.ops.import_scene.gltf(filepath=path),
     ".fbx": lambda path: bpy.ops.import_scene.fbx(filepath=path),
+    **dict.fromkeys(usd.ENDINGS, lambda path: bpy.ops.wm.usd_import(filepath=path)),
 }
 
 BLEND_MAGIC = b"BLENDER"
@@ -42,9 +43,9 @@ _ABOUT_ERROR = re.compile(r"^((Error|OSError): |\[Errno \d+\] )+")
 
 
 def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> list[str]:
-    """Opens `path`: a .blend, or a .glb, .gltf or .fbx imported into an empty scene, which gets the frame
-    range of its animation. All objects leave the modes that they were saved in, but for Pose Mode, and
-    evaluations write no files (read_only.py).
+    """Opens `path`: a .blend, or a .glb, .gltf, .fbx or USD file imported into an empty scene, which gets
+    the frame range of its animation. All objects leave the modes that they were saved in, but for Pose Mode,
+    and evaluations write no files (read_only.py).
 
     Returns a sentence for each object that is not as in the file.
 
@@ -63,6 +64,7 @@ def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> list[
                 bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
                 _import(importer, path)
                 _use_frames_of_animation()
+                sentences += usd.lost_in_import(path) if path.suffix.lower() in usd.ENDINGS else []
     except RuntimeError as error:
         # Blender repeats the file name, up to twice, before the reason or behind it.
         before, _path, behind = telling_line(error).rpartition(str(path))
@@ -81,12 +83,13 @@ def open_file(path: Path, load_ui: bool = False, scripts: bool = False) -> list[
     return [*_leave_modes(), *sentences]
 
 
-def _import(importer: Callable[[str], object], path: Path) -> None:
+def _import(importer: Callable[[str], set[str]], path: Path) -> None:
     """Leaves nothing of a file that can not be read to its end."""
     try:
         # An importer's own traceback, which its error has, too.
         with redirect_stderr(io.StringIO()):
-            importer(str(path))
+            if importer(str(path)) != {"FINISHED"}:
+                raise RuntimeError("its importer gives up")
     except RuntimeError:
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         raise

@@ -53,10 +53,12 @@ def uncovered(area: bpy.types.Area, region: bpy.types.Region) -> tuple[float, fl
     return left, right
 
 
-def characters() -> int:
-    """The number of characters that fit the width of the region that is drawn."""
+def characters(pixels: int | None = None) -> int:
+    """The number of characters that fit this width without the interface's scale, or that of the region that
+    is drawn."""
     context = bpy.context
-    return int(context.region.width / context.preferences.system.ui_scale * CHARACTERS_PER_PIXEL)
+    pixels = pixels or context.region.width / context.preferences.system.ui_scale
+    return int(pixels * CHARACTERS_PER_PIXEL)
 
 
 def shortened(name: str, most: int = NAME_LENGTH) -> str:
@@ -75,13 +77,19 @@ def names_text(names: Sequence[str], most: int = 3) -> str:
 
 
 def draw_text(
-    layout: bpy.types.UILayout, text: str, icon: str = "NONE", alert: bool = False, **values: object
+    layout: bpy.types.UILayout,
+    text: str,
+    icon: str = "NONE",
+    alert: bool = False,
+    pixels: int | None = None,
+    **values: object,
 ) -> None:
-    """Draws text in the user's language, wrapped into as many labels as the sidebar's width needs.
+    """Draws text in the user's language, wrapped into as many labels as the width needs.
 
+    pixels  of a dialog, without the interface's scale; None: the region's width
     values  as tr() takes them
     """
-    width = max(20, characters() - (4 if icon != "NONE" else 0))
+    width = max(20, characters(pixels) - (4 if icon != "NONE" else 0))
     column = layout.column(align=True)
     column.alert = alert
     column.scale_y = 0.8

@@ -114,6 +114,10 @@ def seconds_between_redraws(drawing: float) -> float:
     return min(max(SECONDS_BETWEEN_REDRAWS, TIMES_DRAWING * drawing), MOST_SECONDS)
 
 
+# The width of dialogs without the interface's scale, as Blender has it.
+DIALOG = 300
+
+
 class WithDialog(Stepped):
     """A base class: asks for the settings in a dialog first."""
 
@@ -122,7 +126,7 @@ class WithDialog(Stepped):
     def invoke(self, context: bpy.types.Context, event: bpy.types.Event) -> set[str]:
         if not self.in_steps:
             self.has_dialog = True
-            return context.window_manager.invoke_props_dialog(self)
+            return context.window_manager.invoke_props_dialog(self, width=DIALOG)
         return super().invoke(context, event)
 
     def values(self) -> dict[str, object]:

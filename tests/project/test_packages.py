@@ -187,6 +187,7 @@ def test_the_wheel_has_every_module(tmp_path):
         "manual.html",
         "translations/de.po",
         "features/pages/page.html",
+        "features/gltf/players.json",
         "jobs/report.html",
         *(path.relative_to(ADDON).as_posix() for path in ADDON.glob("features/pages/web/*")),
         *(f"ui/pictures/{method.name}.png" for method in sinew.methods()),

@@ -14,8 +14,8 @@ from sinew_addon.attach import attach, properties
 from sinew_addon.base.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.flex import flex
-from sinew_addon.features.flex.limits import Table
 from sinew_addon.features.flex.verdict import Verdict
+from sinew_addon.features.measure.limits import Table
 from sinew_addon.io import files, mesh_io
 
 _TRUNK = {"chest": "spine_03", "neck": "neck_01", "head": "head", "hips": "pelvis", "spine": "spine_02"}

@@ -28,9 +28,9 @@ from sinew_addon.attach import attach
 from sinew_addon.base.steps import result_of
 from sinew_addon.deform import characters
 from sinew_addon.features.flex import flex
-from sinew_addon.features.flex.limits import LIMITS, Limit, Table
 from sinew_addon.features.flex.verdict import OWN
 from sinew_addon.features.measure.battery import JOINTS, SWING, TWIST, Move
+from sinew_addon.features.measure.limits import LIMITS, Limit, Table
 from sinew_addon.features.pages import render
 from sinew_addon.io import files
 from sinew_addon.prepare import leave_blender, prepare_blender

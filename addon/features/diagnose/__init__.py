@@ -2,4 +2,4 @@
 """Faults of weights and rig, shown in the panel, with their vertices selected."""
 
 # What other features may import.
-PUBLIC = ("diagnose",)
+PUBLIC = ("diagnose", "mending")

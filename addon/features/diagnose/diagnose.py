@@ -3,7 +3,7 @@
 weights change."""
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import bmesh
 import bpy
@@ -17,11 +17,12 @@ from ...io import armature_io, mesh_io
 from ...skinning.arrays import read
 from ...skinning.influences import GroupWeights
 from ...skinning.rig import Bones
-from ...skinning.vectors import rotations_of
+from ...skinning.vectors import rotations_of, transformed
 from ...ui import stepped
 from ...ui.operators import selected
 from ...ui.translations import tr
 from ..measure.diagnostics import Finding
+from ..measure.stray_weights import stray_weights
 from ..measure.subjects import Edited
 
 
@@ -32,6 +33,8 @@ class Check:
     mesh     the session_uid of the mesh
     frames   which poses were checked, in words
     over     one of stepped.OVER; empty for a single pose
+    beside   the session_uid of those that were checked together, as one character
+    places   patches that Flex found, by their keys
     suspect  the mesh was touched since
     stale    weights, groups or bones have changed since the check
     """
@@ -43,9 +46,14 @@ class Check:
     groups: tuple[str, ...]
     bones: Bones
     over: str = ""
+    beside: tuple[int, ...] = ()
+    places: dict[str, Finding] = field(default_factory=dict)
     suspect: bool = False
     stale: bool = False
 
+
+# How far the view is from a place, in sizes of the mesh.
+NEAR = 0.3
 
 # By the session_uid of the object.
 _checks: dict[int, Check] = {}
@@ -86,18 +94,36 @@ def of(obj: bpy.types.Object) -> Check | None:
 
 
 def check_again(scene: bpy.types.Scene, obj: bpy.types.Object, most_influences: int) -> Iterator[float]:
-    """Repeats the last check; yields the progress."""
+    """Repeats the last check, with those that were checked together; yields the progress."""
     found = of(obj)
+    beside = found.beside if found is not None else ()
+    objects = [obj, *(each for each in scene.objects if each != obj and each.session_uid in beside)]
     if found is not None and found.over:
-        yield from check_frames(scene, [obj], most_influences, found.over)
+        yield from check_frames(scene, objects, most_influences, found.over)
     else:
-        check(scene, [obj], most_influences)
+        check(scene, objects, most_influences)
 
 
-def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
+def has(obj: bpy.types.Object, key: str) -> bool:
+    """Whether this fault is known, and can be shown and mended."""
+    found = of(obj)
+    return found is not None and (key in found.places or any(each.key == key for each in found.findings))
+
+
+def keep_places(obj: bpy.types.Object, places: Sequence[Finding]) -> None:
+    """Has patches of a mesh that was checked selected and mended as findings are."""
+    _checks[obj.session_uid].places = {finding.key: finding for finding in places}
+
+
+def forget_place(obj: bpy.types.Object, key: str) -> None:
+    _checks[obj.session_uid].places.pop(key, None)
+
+
+def finding_of(obj: bpy.types.Object, key: str) -> tuple[Check, Finding]:
     """Raises SinewError where no such fault is known, or the mesh now has other vertices."""
     found = of(obj)
-    finding = next((f for f in found.findings if f.name == name), None) if found is not None else None
+    known = {**{f.key: f for f in found.findings}, **found.places} if found is not None else {}
+    finding = known.get(key)
     if finding is None:
         raise SinewError(f"{obj.name}: no such fault is known; press Check again")
     if len(found.weights.counts) != _vertex_count(obj):
@@ -107,10 +133,47 @@ def finding_of(obj: bpy.types.Object, name: str) -> tuple[Check, Finding]:
     return found, finding
 
 
-def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.types.Context) -> None:
-    """Enters edit mode with exactly these vertices selected. Raises SinewError where that is not possible."""
+def select_vertices(
+    obj: bpy.types.Object, vertices: np.ndarray, context: bpy.types.Context, bone: str = ""
+) -> None:
+    """Selects exactly these vertices, in edit mode, or in weight paint mode where the mesh is in it, and
+    looks at them in the 3D views. Raises SinewError where that is not possible.
+
+    bone  whose vertex group is made the active one; "" for none
+    """
     if obj.name not in context.view_layer.objects or not obj.visible_get():
         raise SinewError(f"{obj.name} is hidden; show it to edit it")
+    if bone in obj.vertex_groups:
+        obj.vertex_groups.active_index = obj.vertex_groups[bone].index
+    mesh = obj.data
+    chosen = np.zeros(len(mesh.vertices), dtype=bool)
+    chosen[vertices] = True
+    is_painted = obj.mode == "WEIGHT_PAINT"
+    if not is_painted:
+        _make_active_alone(obj, context)
+    # Hidden vertices cannot be selected.
+    mesh.vertices.foreach_set("hide", read(mesh.vertices, "hide", kind=bool) & ~chosen)
+    if is_painted:
+        mesh.use_paint_mask_vertex = True
+        mesh.vertices.foreach_set("select", chosen)
+        mesh.update()
+    else:
+        _select_in_edit_mode(mesh, vertices, context)
+    _look_at(context, obj, vertices)
+
+
+def _look_at(context: bpy.types.Context, obj: bpy.types.Object, vertices: np.ndarray) -> None:
+    """Blender's own operator would not come nearer to a single vertex, and follows the pose in no mode."""
+    points = transformed(mesh_io.read_points(obj.data)[vertices], np.array(obj.matrix_world))
+    size = max(NEAR * max(obj.dimensions), 2.0 * float(np.linalg.norm(np.ptp(points, axis=0))))
+    for area in context.screen.areas if context.screen is not None else ():
+        if area.type == "VIEW_3D" and area.spaces.active.region_3d is not None:
+            view = area.spaces.active.region_3d
+            view.view_location = points.mean(axis=0).tolist()
+            view.view_distance = min(view.view_distance, size)
+
+
+def _make_active_alone(obj: bpy.types.Object, context: bpy.types.Context) -> None:
     active = context.view_layer.objects.active
     if active is not None and active.mode != "OBJECT":
         bpy.ops.object.mode_set(mode="OBJECT")
@@ -119,11 +182,9 @@ def select_vertices(obj: bpy.types.Object, vertices: np.ndarray, context: bpy.ty
         other.select_set(False)
     obj.select_set(True)
     context.view_layer.objects.active = obj
-    mesh = obj.data
-    chosen = np.zeros(len(mesh.vertices), dtype=bool)
-    chosen[vertices] = True
-    # Hidden vertices cannot be selected.
-    mesh.vertices.foreach_set("hide", read(mesh.vertices, "hide", kind=bool) & ~chosen)
+
+
+def _select_in_edit_mode(mesh: bpy.types.Mesh, vertices: np.ndarray, context: bpy.types.Context) -> None:
     # Not through the context: Blender 4.2 would keep the scene with the context, and crash without it.
     context.scene.tool_settings.mesh_select_mode = (True, False, False)
     bpy.ops.object.mode_set(mode="EDIT")
@@ -164,16 +225,21 @@ def _add_pose(meshes: Sequence[Edited], frame: float) -> None:
 
 
 def _keep(meshes: Sequence[Edited], most_influences: int, frames: str, over: str = "") -> None:
-    for mesh in meshes:
+    beside = tuple(mesh.obj.session_uid for mesh in meshes)
+    for mesh, stray in zip(meshes, stray_weights(meshes), strict=True):
         obj = mesh.obj
+        before = _checks.get(obj.session_uid)
+        is_same = before is not None and before.mesh == obj.data.session_uid
         _checks[obj.session_uid] = Check(
-            mesh.findings(most_influences),
+            [*stray, *mesh.findings(most_influences)],
             frames,
             obj.data.session_uid,
             mesh.weights,
             tuple(obj.vertex_groups.keys()),
             mesh.weighting.bones,
             over,
+            beside,
+            before.places if is_same else {},
         )
 
 

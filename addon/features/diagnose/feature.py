@@ -72,13 +72,16 @@ class _OnFinding(operators.Acting):
 
 class SINEW_OT_select_finding(_OnFinding, bpy.types.Operator):
     bl_label = "Select"
-    bl_description = "Enter edit mode with exactly these vertices selected; hidden ones are shown"
+    bl_description = (
+        "Select exactly these vertices, in edit mode or weight paint mode, and look at them; hidden ones are "
+        "shown"
+    )
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     def run(self, context: bpy.types.Context) -> None:
         obj = self.mesh(context)
         _check, finding = diagnose.finding_of(obj, self.finding)
-        diagnose.select_vertices(obj, finding.vertices, context)
+        diagnose.select_vertices(obj, finding.vertices, context, finding.bone)
         count = len(finding.vertices)
         self.report({"INFO"}, counted(count, "Selected {count} vertex", "Selected {count} vertices"))
 
@@ -108,11 +111,12 @@ class SINEW_OT_mend(_OnFinding, bpy.types.Operator):
         manager.progress_begin(0.0, 1.0)
         try:
             done = mending.mend(obj, self.finding, self.how, most)
+            diagnose.forget_place(obj, self.finding)
             for share in diagnose.check_again(scene, obj, most):
                 manager.progress_update(share)
         finally:
             manager.progress_end()
-        left = next((each.count for each in diagnose.of(obj).findings if each.name == self.finding), 0)
+        left = next((each.count for each in diagnose.of(obj).findings if each.key == self.finding), 0)
         text = tr("Mended {what}. Checked again: {count} left", what=done, count=f"{left:,}")
         self.report({"INFO"}, text)
 
@@ -163,20 +167,16 @@ def _draw_check(layout: bpy.types.UILayout, obj: bpy.types.Object, found: diagno
 
 
 def _draw_finding(layout: bpy.types.UILayout, obj: bpy.types.Object, finding: Finding) -> None:
-    draw_text(layout, f"{tr(finding.title)}: {finding.count:,}", icon="ERROR")
+    what = f"{tr(finding.title)}: {finding.count:,}"
+    draw_text(layout, f"{finding.bone}: {what}" if finding.bone else what, icon="ERROR")
     if finding.groups:
         draw_text(layout, names_text(finding.groups, NAMES_SHOWN))
     draw_text(layout, finding.advice)
     if len(finding.vertices):
         text = counted(len(finding.vertices), "Select {count} Vertex", "Select {count} Vertices")
         button = layout.operator("sinew.select_finding", text=text, icon="RESTRICT_SELECT_OFF")
-        button.object, button.finding = obj.name, finding.name
-    mends = mending.MENDS.get(finding.name, ())
-    # Three side by side would be too narrow to read.
-    grid = layout.grid_flow(row_major=True, columns=min(len(mends), 2), even_columns=True, align=True)
-    for each in mends:
-        button = grid.operator("sinew.mend", text=each.label)
-        button.object, button.finding, button.how = obj.name, finding.name, each.name
+        button.object, button.finding = obj.name, finding.key
+    mending.draw(layout, obj, finding.name, finding.key)
     layout.separator(factor=0.5)
 
 

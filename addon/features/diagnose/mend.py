@@ -7,8 +7,10 @@ import numpy as np
 
 from ...skinning.influences import GroupWeights
 
-# For each mended vertex: the weight in each group, by the group's index, in stored order.
-Rows = dict[int, dict[int, float]]
+# The weight in each group, by the group's index, in stored order.
+Row = dict[int, float]
+# For each mended vertex.
+Rows = dict[int, Row]
 SMOOTH_STEPS, SMOOTH_FACTOR = 5, 0.5
 # Smaller weights are dropped after smoothing.
 LEAST_WEIGHT = 1e-3
@@ -52,19 +54,42 @@ class WeightMender:
             rows |= mixed
         return {vertex: self._limited(rows[vertex], limit) for vertex in vertices}
 
-    def filled(self, vertices: Sequence[int], edges: np.ndarray, limit: int) -> Rows:
+    def without(self, vertices: Sequence[int], group: int, edges: np.ndarray, limit: int) -> Rows:
+        """Takes the weights of a group away and scales the others to a sum of 1. Vertices that have no other
+        are filled in as by filled(), and left out where they can not be.
+
+        edges  int [edges, 2]
+        """
+        rows = {}
+        for vertex in vertices:
+            row = self._row(vertex)
+            if group in row:
+                rows[vertex] = self._normalized({g: w for g, w in row.items() if g != group})
+        bare = [vertex for vertex, row in rows.items() if self._free_sum(row) <= 0.0]
+        known = {vertex: row for vertex, row in rows.items() if vertex not in set(bare)}
+        return known | self.filled(bare, edges, limit, known)
+
+    def filled(
+        self, vertices: Sequence[int], edges: np.ndarray, limit: int, others: Mapping[int, Row] | None = None
+    ) -> Rows:
         """Fills in the mean of the neighbours that have weights, from the border of the vertices inwards;
         vertices that are not connected to any weighted vertex are left out.
 
-        edges  int [edges, 2]
+        edges   int [edges, 2]
+        others  rows that replace those of other vertices
         """
         neighbours = _neighbours(vertices, edges)
         open_ones: set[int] = set(vertices)
         found: Rows = {}
+        known_rows = others or {}
         while True:
             layer = {}
             for vertex in sorted(open_ones):
-                rows = [found.get(v) or self._row(v) for v in neighbours[vertex] if v not in open_ones]
+                rows = [
+                    found.get(v) or known_rows.get(v) or self._row(v)
+                    for v in neighbours[vertex]
+                    if v not in open_ones
+                ]
                 known = [row for row in rows if self._free_sum(row) > 0.0]
                 if known:
                     layer[vertex] = self._limited(self._replaced(self._row(vertex), _mean(known)), limit)

@@ -41,11 +41,24 @@ MIRROR = Mend(
     "From Other Side",
     "Give these vertices the weights of those at the mirrored place (X), in the groups of the other side",
 )
+UNBIND = Mend(
+    "unbind",
+    "Remove Influence",
+    "Take the bone off these vertices, and scale their other weights to a sum of 1; those that had no other "
+    "get the weights of those around them",
+)
 REMOVE = Mend("remove", "Remove Groups", "Delete these vertex groups; those that are locked stay")
-ALL = {mend.name: mend for mend in (LIMIT, NORMALIZE, SMOOTH, FILL, MIRROR, REMOVE)}
+ALL = {mend.name: mend for mend in (LIMIT, NORMALIZE, SMOOTH, FILL, MIRROR, UNBIND, REMOVE)}
 
+_STRAY = (UNBIND, MIRROR, SMOOTH)
 # By the finding's name.
 MENDS = {
+    "bleed": _STRAY,
+    "astray": _STRAY,
+    "other_side": _STRAY,
+    "unweighted": (FILL, MIRROR),
+    "stretch": (SMOOTH,),
+    "flips": (SMOOTH,),
     "no_weights": (FILL, MIRROR),
     "small_sums": (NORMALIZE, FILL, MIRROR),
     "many_influences": (LIMIT,),
@@ -56,6 +69,16 @@ MENDS = {
 }
 
 
+def draw(layout: bpy.types.UILayout, obj: bpy.types.Object, name: str, key: str) -> None:
+    """Draws the buttons of a finding."""
+    mends = MENDS.get(name, ())
+    # Three side by side would be too narrow to read.
+    grid = layout.grid_flow(row_major=True, columns=min(len(mends), 2), even_columns=True, align=True)
+    for each in mends:
+        button = grid.operator("sinew.mend", text=each.label)
+        button.object, button.finding, button.how = obj.name, key, each.name
+
+
 def mend(obj: bpy.types.Object, finding: str, how: str, most_influences: int) -> str:
     """Changes weights or groups. Returns what was done, in words.
 
@@ -64,7 +87,7 @@ def mend(obj: bpy.types.Object, finding: str, how: str, most_influences: int) ->
     check, found = diagnose.finding_of(obj, finding)
     if check.stale:
         raise SinewError(f"{obj.name}: its weights, groups or bones have changed since; press Check again")
-    if how not in {each.name for each in MENDS.get(finding, ())}:
+    if how not in {each.name for each in MENDS.get(found.name, ())}:
         raise SinewError(f"{obj.name}: {how!r} does not mend {found.title.lower()}")
     if how == REMOVE.name:
         return _remove(obj, found)
@@ -82,6 +105,7 @@ _NOTHING = {
     NORMALIZE.name: "no weights to scale; their groups may be locked",
     SMOOTH.name: "no weights to smooth",
     FILL.name: "no vertex with weights is connected to these",
+    UNBIND.name: "the group of the bone is locked, or gone",
     MIRROR.name: "no vertex with weights is at the mirrored place of these",
 }
 
@@ -112,6 +136,10 @@ def _rows(
         return mender.limited(vertices, most_influences)
     if how == NORMALIZE.name:
         return mender.normalized(vertices)
+    if how == UNBIND.name:
+        group = obj.vertex_groups.get(found.bone)
+        number = group.index if group is not None and not group.lock_weight else -1
+        return mender.without(vertices, number, mesh_io.read_topology(obj.data).edges, most_influences)
     work = mender.smoothed if how == SMOOTH.name else mender.filled
     return work(vertices, mesh_io.read_topology(obj.data).edges, most_influences)
 

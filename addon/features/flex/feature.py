@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator, Iterator
+from collections.abc import Generator, Iterable, Iterator, Mapping, Sequence
 
 import bpy
 import numpy as np
@@ -17,19 +17,18 @@ from ...base.errors import SinewError
 from ...skinning.variants import Variant, parse
 from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
-from ...ui.sidebar import Sidebar, draw_text
+from ...ui.sidebar import Sidebar, draw_text, names_text
 from ...ui.translations import tr
-from ..diagnose import diagnose
+from ..diagnose import diagnose, mending
+from ..measure import diagnostics
+from ..measure.limits import Table
 from ..measure.worst_frames import check_measurable
 from ..pages.save import SavesPage
 from ..variants import choices
 from . import flex, page
-from .limits import Table
 from .verdict import Finding, Joint
 
-JOINTS_SHOWN = 8
-# How far the view is from a place, in sizes of the mesh.
-NEAR = 0.3
+FAULTS_SHOWN = 8
 
 # By the session_uid of the scene. Nothing is stored in files.
 results: dict[int, flex.Result] = {}
@@ -58,8 +57,26 @@ class SINEW_OT_flex(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
         self.result = yield from flex.flex(objects, others, Table(), {})
 
     def run(self, context: bpy.types.Context) -> None:
-        results[context.scene.session_uid] = self.result
+        scene = context.scene
+        results[scene.session_uid] = self.result
+        objects = sinew_targets(context)
+        diagnose.check(scene, objects, scene.sinew_most_influences)
+        for obj in objects:
+            diagnose.keep_places(obj, list(_places_on(obj, self.result)))
         self.report({"INFO"}, _headline(self.result))
+
+
+def _places_on(obj: bpy.types.Object, result: flex.Result) -> Iterator[diagnostics.Finding]:
+    """Yields the patches of a mesh that can be mended."""
+    if read_stack(obj).changes_ahead:
+        return
+    for own, _others in result.verdict.by_cause():
+        limit = own.limit
+        if obj.name in own.patch:
+            patch = own.patch[obj.name]
+            yield diagnostics.Finding(
+                limit.name, limit.label, patch, limit.meaning, limit.advice, bone=own.joint
+            )
 
 
 class _OnFinding(operators.Acting):
@@ -79,23 +96,19 @@ class _OnFinding(operators.Acting):
 
 class SINEW_OT_flex_place(_OnFinding, bpy.types.Operator):
     bl_label = "Select"
-    bl_description = "Enter edit mode with the vertex selected where this is worst, in the middle of the view"
+    bl_description = (
+        "Select the vertices where this is worst, in edit mode or weight paint mode, and look at them"
+    )
     bl_options = {"REGISTER", "UNDO", "INTERNAL"}
 
     def run(self, context: bpy.types.Context) -> None:
-        _result, _joint, finding = self.found(context)
+        _result, joint, finding = self.found(context)
         obj = context.scene.objects.get(finding.mesh)
         if obj is None or finding.vertex >= len(obj.data.vertices) or read_stack(obj).changes_ahead:
             raise SinewError(f"{finding.mesh} has other vertices than those that were bent")
         if not obj.data.is_editable:
             raise SinewError(f"{obj.name}: its mesh is linked from another file and can only be edited there")
-        diagnose.select_vertices(obj, np.array([finding.vertex]), context)
-        # Blender's own operator would not come nearer to a single vertex.
-        for area in context.screen.areas if context.screen is not None else ():
-            if area.type == "VIEW_3D" and area.spaces.active.region_3d is not None:
-                view = area.spaces.active.region_3d
-                view.view_location = finding.point
-                view.view_distance = min(view.view_distance, NEAR * max(obj.dimensions))
+        diagnose.select_vertices(obj, finding.patch[finding.mesh], context, joint.name)
 
 
 class SINEW_OT_flex_pose(_OnFinding, bpy.types.Operator):
@@ -167,14 +180,20 @@ class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
         draw_text(layout, _headline(result), icon="CHECKMARK" if is_good else "ERROR")
         if not stepped.draw_progress(layout, SINEW_OT_save_flex.bl_idname):
             layout.operator("sinew.save_flex", icon="URL")
-        bad = [(number, joint) for number, joint in enumerate(result.verdict.joints) if not joint.is_good]
-        told: set[str] = set()
+        places = {
+            id(finding): (number, place)
+            for number, joint in enumerate(result.verdict.joints)
+            for place, finding in enumerate(joint.findings)
+        }
         lead = character.lead(context)
         now = variant_settings.read(lead) if lead is not None else None
-        for number, joint in bad[:JOINTS_SHOWN]:
-            _draw_joint(layout.box().column(), number, joint, told, now)
-        if len(bad) > JOINTS_SHOWN:
-            draw_text(layout, "and {count} more: `sinew flex` lists all", count=len(bad) - JOINTS_SHOWN)
+        faults, told = result.verdict.by_cause(), set()
+        shown = len(faults) if context.scene.sinew_all_faults else FAULTS_SHOWN
+        for own, others in faults[:shown]:
+            _draw_fault(layout.box().column(), context, places, own, others, told, now)
+        if len(faults) > FAULTS_SHOWN:
+            text = tr("Show All {count}", count=len(faults))
+            layout.prop(context.scene, "sinew_all_faults", text=text, translate=False, toggle=True)
 
 
 def _headline(result: flex.Result) -> str:
@@ -184,41 +203,69 @@ def _headline(result: flex.Result) -> str:
     )
 
 
-def _draw_joint(
-    layout: bpy.types.UILayout, number: int, joint: Joint, told: set[str], now: Variant | None
+def _draw_fault(
+    layout: bpy.types.UILayout,
+    context: bpy.types.Context,
+    places: Mapping[int, tuple[int, int]],
+    own: Finding,
+    others: Sequence[Finding],
+    told: set[str],
+    now: Variant | None,
 ) -> None:
     """
-    told  names of limits whose advice is above
-    now   what deforms the character
+    places  of findings in the list, by their id
+    others  those that come from it
+    told    names of limits whose advice is above
+    now     what deforms the character
     """
-    layout.label(text=joint.name, icon="BONE_DATA", translate=False)
-    for place, finding in enumerate(joint.findings):
-        limit = finding.limit
-        text = tr(limit.label)
-        if limit.name != "inert":
-            value = f"{limit.number(finding.value)} {tr(limit.unit)}"
-            text = tr("{what}: {value}", what=text, value=value)
-        row = layout.row(align=True)
-        row.label(text=text, translate=False)
-        if finding.pose:
-            button = row.operator("sinew.flex_pose", text="", icon="ARMATURE_DATA")
-            button.joint, button.finding = number, place
-        if finding.mesh:
-            button = row.operator("sinew.flex_place", text="", icon="RESTRICT_SELECT_OFF")
-            button.joint, button.finding = number, place
-        if finding.mends:
-            layout.label(text="Not under", icon="SOLO_ON")
-            column = layout.column(align=True)
-            for key in finding.mends:
-                choices.draw_use(column, parse(key), now)
-        elif limit.name not in told:
-            told.add(limit.name)
-            draw_text(layout, tr(limit.meaning))
-            draw_text(layout, tr(limit.advice))
+    limit, key = own.limit, f"{own.limit.name} {own.joint}"
+    layout.label(text=own.joint, icon="BONE_DATA", translate=False)
+    _draw_place(layout, places[id(own)], own)
+    if own.mends:
+        layout.label(text="Not under", icon="SOLO_ON")
+        column = layout.column(align=True)
+        for text in own.mends:
+            choices.draw_use(column, parse(text), now)
+    elif limit.name not in told:
+        told.add(limit.name)
+        draw_text(layout, tr(limit.meaning))
+        draw_text(layout, tr(limit.advice))
+    for obj in filter(None, map(context.scene.objects.get, own.patch)):
+        if diagnose.has(obj, key):
+            mending.draw(layout, obj, limit.name, key)
+    if others:
+        draw_text(
+            layout, "From it, at {joints}:", joints=names_text(_unique(each.joint for each in others), 4)
+        )
+        draw_text(layout, ", ".join(tr(label) for label in _unique(each.limit.label for each in others)))
+
+
+def _unique(names: Iterable[str]) -> list[str]:
+    return list(dict.fromkeys(names))
+
+
+def _draw_place(layout: bpy.types.UILayout, place: tuple[int, int], finding: Finding) -> None:
+    limit = finding.limit
+    text = tr(limit.label)
+    if limit.name != "inert":
+        text = tr("{what}: {value}", what=text, value=f"{limit.number(finding.value)} {tr(limit.unit)}")
+    row = layout.row(align=True)
+    row.label(text=text, translate=False)
+    if finding.pose:
+        button = row.operator("sinew.flex_pose", text="", icon="ARMATURE_DATA")
+        button.joint, button.finding = place
+    if finding.mesh:
+        button = row.operator("sinew.flex_place", text="", icon="RESTRICT_SELECT_OFF")
+        button.joint, button.finding = place
 
 
 FEATURE = Feature(
     (SINEW_OT_flex, SINEW_OT_flex_place, SINEW_OT_flex_pose, SINEW_OT_save_flex, SINEW_PT_flex),
+    {
+        "Scene.sinew_all_faults": bpy.props.BoolProperty(
+            name="Show All Faults", description="Show all faults that Flex found, not the first few alone"
+        )
+    },
     subscriptions=((subscribers.loading, results.clear),),
     end=results.clear,
 )

@@ -16,24 +16,14 @@ from ...base.errors import SinewError
 from ...skinning.rig import Bones
 from ...skinning.variants import is_key, parse
 from ..measure import battery, live
+from ..measure.character import Character
 from ..measure.crossings import crossing_triangles
+from ..measure.limits import Table
 from ..measure.measured_on import OWN as OWN_METHOD
 from ..measure.measured_on import MeasuredOn
 from ..measure.metrics import FrameOfRig
-from ..measure.rigs import Rig, posed
-from .character import Character, Skeleton
-from .limits import Table
+from ..measure.rigs import Rig, posed, skeleton_of
 from .verdict import OWN, Pose, Verdict, judge
-
-
-@dataclass
-class _Rig(Rig):
-    """first: the number of its first bone in the skeleton"""
-
-    first: int = 0
-
-    def rest(self) -> np.ndarray:
-        return self.world @ self.bones.rest[: len(self.bones.names)].astype(np.float64)
 
 
 @dataclass(frozen=True)
@@ -105,15 +95,15 @@ def flex(
     return Result(verdict, rotations, methods, of_objects, basis)
 
 
-def _rigs(now: live.Moment) -> list[_Rig]:
-    found: dict[int, _Rig] = {}
+def _rigs(now: live.Moment) -> list[Rig]:
+    found: dict[int, Rig] = {}
     first = 0
     for part, world in zip(now.subject.parts, now.armatures, strict=True):
         armature, deformer = properties.of(part.obj).armature, part.bound.first_deformer
         if armature is None:
             raise SinewError(f"{part.obj.name}: its armature is missing")
         if armature.session_uid not in found:
-            found[armature.session_uid] = _Rig(armature, deformer.bones, world, first=first)
+            found[armature.session_uid] = Rig(armature, deformer.bones, world, first=first)
             first += len(deformer.bones.names)
         else:
             rig = found[armature.session_uid]
@@ -122,7 +112,7 @@ def _rigs(now: live.Moment) -> list[_Rig]:
     return list(found.values())
 
 
-def _character(now: live.Moment, rigs: Sequence[_Rig]) -> Character:
+def _character(now: live.Moment, rigs: Sequence[Rig]) -> Character:
     columns = []
     for part in now.subject.parts:
         rig = next(each for each in rigs if each.armature == properties.of(part.obj).armature)
@@ -133,37 +123,12 @@ def _character(now: live.Moment, rigs: Sequence[_Rig]) -> Character:
         np.ascontiguousarray(rest.points.T),
         now.pose.skin.influences,
         np.concatenate(columns),
-        _skeleton(rigs),
+        skeleton_of(rigs),
         [(part.obj.name, part.surface.vertex_count) for part in now.subject.parts],
     )
 
 
-def _skeleton(rigs: Sequence[_Rig]) -> Skeleton:
-    names: list[str] = []
-    roles: list[str] = []
-    parts = []
-    for number, rig in enumerate(rigs):
-        bones, rest = rig.bones, rig.rest()
-        names += bones.names
-        roles += rig.battery.roles()
-        side, mirror = battery.sides(bones.names)
-        parts.append(
-            (
-                rest,
-                bones.limb_ends(rest),
-                np.where(bones.deforming_parents >= 0, bones.deforming_parents + rig.first, -1),
-                bones.deform,
-                side,
-                np.where(mirror >= 0, mirror + rig.first, -1),
-                np.full(len(side), number),
-            )
-        )
-    rest, tails, above, deform, side, mirror, rig_of = map(np.concatenate, zip(*parts, strict=True))
-    rig_names = tuple(rig.armature.name for rig in rigs)
-    return Skeleton(tuple(names), rest, tails, above, deform, tuple(roles), side, mirror, rig_of, rig_names)
-
-
-def _poses(rigs: Sequence[_Rig], table: Table) -> Iterator[tuple[_Rig, tuple[int, ...], battery.Pose]]:
+def _poses(rigs: Sequence[Rig], table: Table) -> Iterator[tuple[Rig, tuple[int, ...], battery.Pose]]:
     """Yields each pose with the bones that it bends."""
     for rig in rigs:
         for bone, pose in rig.battery.of_joints(table.joints):

@@ -4,14 +4,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import cached_property
 
 import numpy as np
 
 from ...skinning.surface import Surface
+from ..measure.character import Character, Place
 from ..measure.metrics import LEAST_IN_RING, FrameOfRig, Gauge, Measured, Shape
-from .character import Character
 
 Crossings = Callable[[np.ndarray, np.ndarray], set[tuple[int, int]]]
 """Of points [vertices, 3] and triangles [n, 3]: the pairs that cross and share no vertex."""
@@ -29,14 +29,6 @@ SHORT = 0.2
 LEAST_TRIANGLES = 8
 # Of fewer, one that is flipped is a large share.
 ENOUGH_FOR_SHARES = 24
-
-
-@dataclass(frozen=True)
-class Place:
-    """Where a measure is worst: a vertex of the character, with its point at rest."""
-
-    vertex: int
-    point: np.ndarray
 
 
 class Region:
@@ -111,11 +103,15 @@ class Region:
             if len(ring) >= LEAST_IN_RING and _spread(self.rest, ring) > LEAST_SPREAD * self.girth
         ]
 
-    @cached_property
-    def pivot(self) -> float:
+    def pivot(self, left_out: np.ndarray | None = None) -> float:
         """How far the bone's head is from the middle of what it bends, in spreads of that; 0 where no vertex
-        follows the bone alone."""
+        follows the bone alone.
+
+        left_out  bool [vertices of the character] that do not count; None for none
+        """
         weights = self.shares * (1.0 - self.shares)
+        if left_out is not None:
+            weights = np.where(left_out[self.vertices], 0.0, weights)
         total = float(weights.sum())
         if total < 1.0 or not self._has_limb:
             return 0.0
@@ -161,7 +157,8 @@ class Region:
         # times the girth is the volume.
         whole = Shape(self.character.surface, points).volume - self.character.rest.volume
         change = whole / max(0.5 * rest.area * self.girth, 1e-30)
-        found["volume_loss"] = max(-change, 0.0), self.middle
+        # What is turned inside out has lost all, and no more.
+        found["volume_loss"] = min(max(-change, 0.0), 1.0), self.middle
         found["volume_gain"] = max(change, 0.0), self.middle
         ratios = [_spread(shape, ring) / max(_spread(rest, ring), 1e-12) for ring in self.rings]
         if ratios:

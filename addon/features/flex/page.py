@@ -42,11 +42,13 @@ def page(
             label = name if len(rotations) > 1 else f"{joint}: {name}"
             poses.append(viewer.Pose(label, armature, rotations))
         numbers[armature, joint, name] = len(poses) - 1
-    findings = [
-        _entry(scene, joint, finding, numbers.get((joint.armature, joint.name, finding.pose), 0))
-        for joint in result.verdict.joints
-        for finding in joint.findings
-    ]
+    joints = {id(finding): joint for joint in result.verdict.joints for finding in joint.findings}
+    findings = []
+    for own, others in result.verdict.by_cause():
+        for finding in (own, *others):
+            joint = joints[id(finding)]
+            pose = numbers.get((joint.armature, joint.name, finding.pose), 0)
+            findings.append(_entry(scene, joint, finding, pose))
     found = Found(headline(result.verdict.to_dict()), findings)
     attached = viewer.attached_to(scene, objects)
     of_each: dict[bpy.types.Object, Sequence[bpy.types.Object]] = dict.fromkeys(objects, ())

@@ -4,8 +4,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from math import inf
 from typing import Any
 from xml.etree import ElementTree
+
+from .verdict import by_cause
 
 Report = Mapping[str, Any]
 
@@ -27,13 +30,14 @@ def lines(report: Report) -> Iterator[str]:
     yield f"{report['file']}: {'ok' if report['passed'] else 'FAILED'}: {headline(report)}"
     for reason in report["left_out"]:
         yield f"  left out: {reason}"
-    findings = list(_findings(report))
-    for joint, finding in findings:
-        mends = f"; not under {', '.join(finding['mends'])}" if finding["mends"] else ""
-        yield f"  {joint}: {_text(finding)}{mends}"
+    findings = _by_cause(report)
+    for own, others in findings:
+        yield f"  {_line(*own)}"
+        yield from (f"    from it: {_line(*each)}" for each in others)
     # What is said of several joints is said once.
     yield from dict.fromkeys(
-        f"  {finding['label']}: {finding['meaning']} {finding['advice']}" for _joint, finding in findings
+        f"  {finding['label']}: {finding['meaning']} {finding['advice']}"
+        for (_joint, finding), _others in findings
     )
 
 
@@ -75,7 +79,8 @@ def markdown(reports: Sequence[Report]) -> str:
         parts += [f"- left out: {_cell(reason)}\n" for reason in report["left_out"]]
         rows = [
             f"| {' | '.join(map(_cell, (joint, each['text'], each['place'], each['advice'])))} |"
-            for joint, each in _findings(report)
+            for own, others in _by_cause(report)
+            for joint, each in (own, *others)
         ]
         if rows:
             head = ["| joint | finding | where | what to do |", "|---|---|---|---|"]
@@ -83,10 +88,24 @@ def markdown(reports: Sequence[Report]) -> str:
     return "\n".join(parts)
 
 
-def _findings(report: Report) -> Iterator[tuple[str, Report]]:
-    for joint in report.get("joints", []):
-        for finding in joint["findings"]:
-            yield joint["joint"], finding
+_Found = tuple[str, Report]
+"""The name of a joint, and a finding."""
+
+
+def _by_cause(report: Report) -> list[tuple[_Found, list[_Found]]]:
+    """As of Verdict.by_cause()."""
+    found = [(joint["joint"], each) for joint in report.get("joints", []) for each in joint["findings"]]
+    return by_cause(
+        found,
+        lambda each: (each[0], each[1]["name"]),
+        lambda each: each[1]["caused_by"] and (each[1]["caused_by"]["joint"], each[1]["caused_by"]["name"]),
+        lambda each: inf if each[1]["times"] is None else each[1]["times"],
+    )
+
+
+def _line(joint: str, finding: Report) -> str:
+    mends = f"; not under {', '.join(finding['mends'])}" if finding["mends"] else ""
+    return f"{joint}: {_text(finding)}{mends}"
 
 
 def headline(report: Report) -> str:

@@ -7,20 +7,29 @@ import math
 from collections import Counter
 from collections.abc import Callable, Generator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from ..measure.character import Character, Place
+from ..measure.limits import Limit
 from ..measure.metrics import FrameOfRig
-from .character import Character
-from .limits import Limit
-from .measures import Crossings, Place, Region
-from .weights import WeightCheck
+from ..measure.weight_check import WeightCheck
+from .measures import Crossings, Region
 
 OWN = "own"
 """The method that a file has."""
 # Measures that are values of a limb where nothing else is posed.
 _ALONE = ("volume_loss", "volume_gain")
+# Faults that others come from, the plainest first; and those of weights, of which one patch may be several.
+_CAUSES = ("unweighted", "bleed", "astray", "other_side", "pivot")
+_OF_WEIGHTS = ("bleed", "astray", "other_side", "asymmetry")
+# Measures of a whole limb, whose place tells nothing.
+_OF_LIMBS = ("volume_loss", "volume_gain", "radius")
+# A fault's place is at a patch, also, so many edges beside it.
+_RINGS = 2
+# This part of a fault's vertices is in a patch, or this part of a limb, where it comes from there.
+_SAME_PATCH, _OF_LIMB = 1.0 / 3.0, 0.02
 
 
 class Posed(Protocol):
@@ -48,9 +57,10 @@ class Pose(NamedTuple):
 class Finding:
     """One fault of one joint.
 
-    limit     which measure is beyond its limit
-    vertices  how many are concerned; 0 for a measure of the whole joint
-    mends     of the methods that were tried, those under which the joint has this fault no more
+    limit      which measure is beyond its limit
+    patch      int, the vertices that are concerned, by the meshes' names; of a pose, those around the worst
+    mends      of the methods that were tried, those under which the joint has this fault no more
+    caused_by  the joint and the limit of the fault that this one merely comes from; None for one of its own
     """
 
     limit: Limit
@@ -60,8 +70,14 @@ class Finding:
     mesh: str = ""
     vertex: int = -1
     point: tuple[float, ...] = ()
-    vertices: int = 0
+    patch: Mapping[str, np.ndarray] = field(default_factory=dict)
     mends: tuple[str, ...] = ()
+    caused_by: tuple[str, Limit] | None = None
+
+    @property
+    def vertices(self) -> int:
+        """How many are concerned."""
+        return sum(map(len, self.patch.values()))
 
     @property
     def text(self) -> str:
@@ -77,6 +93,9 @@ class Finding:
 
     @property
     def advice(self) -> str:
+        if self.caused_by is not None:
+            joint, limit = self.caused_by
+            return f"It comes from a fault of {joint}: {limit.label}. Mend that."
         if self.mends:
             return f"Under {', '.join(self.mends)} it has this fault no more."
         return self.limit.advice
@@ -93,10 +112,12 @@ class Finding:
             "mesh": self.mesh,
             "vertex": self.vertex,
             "point": list(self.point),
-            "vertices": self.vertices,
+            "vertices": 0 if self.limit.posed else self.vertices,
+            "times": _of_json(self.limit.times(self.value)),
             "meaning": self.limit.meaning,
-            "advice": self.limit.advice,
+            "advice": self.advice if self.caused_by is not None else self.limit.advice,
             "mends": list(self.mends),
+            "caused_by": self.caused_by and {"joint": self.caused_by[0], "name": self.caused_by[1].name},
         }
 
 
@@ -157,6 +178,41 @@ class Verdict:
     def findings(self) -> list[Finding]:
         return [finding for joint in self.joints for finding in joint.findings]
 
+    def by_cause(self) -> list[tuple[Finding, list[Finding]]]:
+        """The faults of their own, the worst first, each with those that come from it."""
+        return by_cause(
+            self.findings,
+            lambda each: (each.joint, each.limit.name),
+            lambda each: each.caused_by and (each.caused_by[0], each.caused_by[1].name),
+            lambda each: each.limit.times(each.value),
+        )
+
+
+_Fault = TypeVar("_Fault")
+_Key = tuple[str, str]
+
+
+def by_cause(
+    faults: Sequence[_Fault],
+    key: Callable[[_Fault], _Key],
+    cause: Callable[[_Fault], _Key | None],
+    times: Callable[[_Fault], float],
+) -> list[tuple[_Fault, list[_Fault]]]:
+    """As of Verdict.by_cause().
+
+    key    of a fault: its joint and its limit
+    cause  the key of what it comes from
+    times  how far it is beyond its limit
+    """
+    own: dict[_Key, tuple[_Fault, list[_Fault]]] = {
+        key(each): (each, []) for each in faults if not cause(each)
+    }
+    for each in faults:
+        above = cause(each)
+        if above is not None and above in own:
+            own[above][1].append(each)
+    return sorted(own.values(), key=lambda each: (not each[1], -times(each[0])))
+
 
 def judge(
     character: Character,
@@ -175,12 +231,12 @@ def judge(
 
 
 class _Worst(NamedTuple):
-    """The worst value of one measure of one joint under one method; vertices: how many are concerned."""
+    """The worst value of one measure of one joint under one method; vertices: int [n], those concerned."""
 
     value: float
     pose: str = ""
     place: Place | None = None
-    vertices: int = 0
+    vertices: np.ndarray = np.zeros(0, int)
 
 
 @dataclass
@@ -228,13 +284,48 @@ class _Judging:
             )
             for bone in sorted(bones)
         }
+        causes = self._causes({key for key in beyond if key[1] == own})
         for key, worst in self._worst.items():
             bone, method, name = key
             if bone in joints:
                 joints[bone].values.setdefault(method, {})[name] = worst.value, worst.pose
                 if method == own and key in beyond:
-                    joints[bone].findings.append(self._finding(bone, name, worst))
+                    found = self._finding(bone, name, worst)
+                    if key in causes:
+                        above, _own, limit = causes[key]
+                        found = replace(found, caused_by=(skeleton.names[above], self._limits[limit]))
+                    joints[bone].findings.append(found)
         return Verdict(list(joints.values()))
+
+    def _causes(self, faults: set[tuple[int, str, str]]) -> dict[tuple[int, str, str], tuple[int, str, str]]:
+        """For each of the faults that merely comes from another, which."""
+        found: dict[tuple[int, str, str], tuple[int, str, str]] = {}
+        causes = [each for each in faults if each[2] in _CAUSES]
+        causes.sort(key=lambda each: (_CAUSES.index(each[2]), -len(self._worst[each].vertices), each[0]))
+        for number, cause in enumerate(causes):
+            if cause in found:
+                continue
+            around = self._character.around(self._worst[cause].vertices, _RINGS)
+            for fault in faults.difference(causes[: number + 1], found):
+                if self._comes_from(fault, cause, around):
+                    found[fault] = cause
+        return found
+
+    def _comes_from(
+        self, fault: tuple[int, str, str], cause: tuple[int, str, str], around: np.ndarray
+    ) -> bool:
+        """around: bool [vertices], those of the cause and beside it"""
+        bone, name, worst, is_posed = fault[0], fault[2], self._worst[fault], self._limits[fault[2]].posed
+        is_own = bone == cause[0]
+        if cause[2] == "pivot":
+            return is_own and is_posed
+        if name == "pivot":
+            return is_own and not self._limits[name].is_beyond(self._region(bone)[0].pivot(around))
+        if name in _OF_WEIGHTS:
+            return (is_own or name == "asymmetry") and _share(around, worst.vertices) >= _SAME_PATCH
+        if name in _OF_LIMBS:
+            return _share(around, self._region(bone)[0].vertices) > (0.0 if is_own else _OF_LIMB)
+        return is_posed and worst.place is not None and bool(around[worst.place.vertex])
 
     def _finding(self, bone: int, name: str, worst: _Worst) -> Finding:
         limit, mends = self._limits[name], []
@@ -243,7 +334,11 @@ class _Judging:
             if under is not None and not limit.is_beyond(under.value):
                 mends.append(method)
         joint = self._character.skeleton.names[bone]
-        found = Finding(limit, joint, worst.value, worst.pose, vertices=worst.vertices, mends=tuple(mends))
+        vertices = worst.vertices
+        if not len(vertices) and worst.place is not None:
+            vertices = np.flatnonzero(self._character.around(np.array([worst.place.vertex]), _RINGS))
+        patch = self._character.by_mesh(vertices)
+        found = Finding(limit, joint, worst.value, worst.pose, patch=patch, mends=tuple(mends))
         if worst.place is None:
             return found
         mesh, vertex = self._character.mesh_of(worst.place.vertex)
@@ -257,7 +352,7 @@ class _Judging:
             at_rest = set()
             if not region.is_empty:
                 at_rest = region.crossing(region.rest.points.T, self._crossings)
-                self._add(bone, self._methods[0], "pivot", _Worst(region.pivot, "", region.middle))
+                self._add(bone, self._methods[0], "pivot", _Worst(region.pivot(), "", region.middle))
             self._regions[bone] = region, at_rest
         return self._regions[bone]
 
@@ -266,3 +361,8 @@ class _Judging:
         sign = -1.0 if self._limits[name].least else 1.0
         if known is None or sign * worst.value > sign * known.value:
             self._worst[bone, method, name] = worst
+
+
+def _share(chosen: np.ndarray, vertices: np.ndarray) -> float:
+    """Of the vertices int [n], the part that is in `chosen`, bool."""
+    return float(chosen[vertices].mean()) if len(vertices) else 0.0

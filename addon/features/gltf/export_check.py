@@ -16,6 +16,7 @@ from ...skinning.influences import Influences
 from ...skinning.vectors import unit
 from ..bake.helper_bones import HelperOptions
 from .played import Played, blended, padded
+from .players import ALL_CLIPS, SHOWN
 
 # Of the diagonal: a smaller distance is rounding.
 EXPLAINED = 1e-5
@@ -56,6 +57,15 @@ class ExportOptions:
     """frames: to verify; None for some of the scene's"""
 
     influences: int = same_option(HelperOptions, "influences")
+    clips: str = option(
+        ALL_CLIPS,
+        "Clips",
+        "Which animation a .glb or .fbx has",
+        choices=(
+            (ALL_CLIPS, "All", "A clip for each action"),
+            (SHOWN, "Shown", "What is seen now, as a single clip"),
+        ),
+    )
     verify: bool = option(
         False,
         "Verify",

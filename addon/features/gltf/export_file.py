@@ -9,7 +9,7 @@ import io
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext, redirect_stderr
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 import addon_utils
@@ -25,7 +25,8 @@ from ..bake.bake_export import TEXTURES_STAY
 from ..bake.baked_files import is_whole
 from ..bake.segment_bones import SegmentReport
 from . import engine_weights, export, usd_scales, verify
-from .export_check import FRAMES, Check, ExportOptions, spread_frames
+from .export_check import FRAMES, Check, ExportOptions, plain, spread_frames
+from .players import SHOWN
 
 # What the add-on for VRM writes of a vertex.
 _VRM_INFLUENCES = 4
@@ -73,6 +74,8 @@ def write(
     )
     left_out += engine_weights.prepare(skinned, kind)
     rigs = {properties.of(obj).armature.name for obj in skinned}
+    if kind == ".usdc":
+        _check_names(sorted(rigs))
     if is_gltf:
         scene.sinew_gltf.skinning = True
     else:
@@ -85,8 +88,8 @@ def write(
             try:
                 if recording is not None and kind == ".fbx":
                     # Before the other actions leave values behind.
-                    _fbx(str(alone), 0, bake_anim_use_all_actions=False, bake_anim_use_nla_strips=False)
-                write_whole(path, lambda own: left_out.extend(_write(own, options.influences, sorted(rigs))))
+                    _fbx(str(alone), replace(options, clips=SHOWN))
+                write_whole(path, lambda own: left_out.extend(_write(own, options, sorted(rigs))))
             except RuntimeError as error:
                 # The exporter's error, with everything that Blender printed.
                 raise SinewError(f"{path}: can not be written: {files.telling_line(error)}") from None
@@ -101,6 +104,20 @@ def write(
     if is_gltf:
         left_out += export.current.left_out
     return Written(bendy, checks, left_out)
+
+
+def _check_names(rigs: list[str]) -> None:
+    """Raises SinewError for bones that USD can not tell apart: all joints are lost then, with no word of the
+    exporter's."""
+    for rig in rigs:
+        known: dict[tuple[str, str], str] = {}
+        for bone in bpy.data.objects[rig].data.bones:
+            other = known.setdefault((bone.parent.name if bone.parent else "", plain(bone.name)), bone.name)
+            if other != bone.name:
+                raise SinewError(
+                    f"{rig}: the bones {other} and {bone.name} have one name in USD, where only letters, "
+                    "digits and underscores count; rename one"
+                )
 
 
 def mirrored(skinned: list[bpy.types.Object]) -> list[str]:
@@ -135,7 +152,7 @@ def write_apart(task: dict, report: Callable[..., None]) -> dict:
     }
 
 
-def _write(path: Path, influences: int, rigs: list[str]) -> list[str]:
+def _write(path: Path, options: ExportOptions, rigs: list[str]) -> list[str]:
     """Returns a sentence for each armature that the file does not have as it should."""
     # If the exporter fails, Blender prints a traceback and raises it as an error.
     kind = {".glb": "gltf", ".vrm": "gltf", ".usdc": "usd"}.get(path.suffix.lower())
@@ -144,7 +161,7 @@ def _write(path: Path, influences: int, rigs: list[str]) -> list[str]:
         if path.suffix.lower() == ".vrm":
             _vrm(str(path), rigs)
         else:
-            _WRITERS[path.suffix.lower()](str(path), influences)
+            _WRITERS[path.suffix.lower()](str(path), options)
     if kind is not None:
         _check_whole(path, kind)
     if scales is None:
@@ -159,11 +176,19 @@ def _check_whole(path: Path, kind: str) -> None:
         raise OSError(errno.ENOSPC, "the disk did not take all of it; is it full?")
 
 
-def _gltf(path: str, influences: int) -> None:
-    bpy.ops.export_scene.gltf(filepath=path, export_format="GLB", export_influence_nb=influences)
+def _gltf(path: str, options: ExportOptions) -> None:
+    chosen = (
+        {"export_influence_nb": options.influences} if options.influences else {"export_all_influences": True}
+    )
+    bpy.ops.export_scene.gltf(
+        filepath=path,
+        export_format="GLB",
+        export_animation_mode="ACTIVE_ACTIONS" if options.clips == SHOWN else "ACTIONS",
+        **chosen,
+    )
 
 
-def _usd(path: str, _influences: int) -> None:
+def _usd(path: str, _options: ExportOptions) -> None:
     bpy.ops.wm.usd_export(
         filepath=path,
         check_existing=False,
@@ -175,7 +200,7 @@ def _usd(path: str, _influences: int) -> None:
     )
 
 
-def _fbx(path: str, _influences: int, **options: bool) -> None:
+def _fbx(path: str, options: ExportOptions) -> None:
     """It goes through all actions, one after the other: a property that only an earlier one keys keeps its
     value in the next."""
     bpy.ops.export_scene.fbx(
@@ -184,7 +209,8 @@ def _fbx(path: str, _influences: int, **options: bool) -> None:
         use_mesh_modifiers=False,
         add_leaf_bones=False,
         bake_anim_simplify_factor=0.0,
-        **options,
+        bake_anim_use_all_actions=options.clips != SHOWN,
+        bake_anim_use_nla_strips=options.clips != SHOWN,
     )
 
 
@@ -207,7 +233,7 @@ def _vrm(path: str, rigs: list[str]) -> None:
         )
 
 
-_WRITERS: dict[str, Callable[[str, int], None]] = {".glb": _gltf, ".usdc": _usd, ".fbx": _fbx}
+_WRITERS: dict[str, Callable[[str, ExportOptions], None]] = {".glb": _gltf, ".usdc": _usd, ".fbx": _fbx}
 
 
 @contextmanager

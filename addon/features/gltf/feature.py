@@ -12,6 +12,7 @@ from ...attach.feature import Feature
 from ...attach.subscribers import subscribers
 from ...base.options import read_options
 from ...base.output import remove, unfinished_path
+from ...base.phrases import Phrase
 from ...deform import characters
 from ...io import files
 from ...ui import stepped
@@ -43,12 +44,39 @@ class SinewGltf(bpy.types.PropertyGroup):
 _ADDON = __package__.rpartition(".features")[0]
 
 
+_ANY, _MOST = "any", 8
+_OF_KIND = {".glb": ("influences", "clips"), ".fbx": ("clips",)}
+
+
+def _choose(operator: bpy.types.Operator, _context: bpy.types.Context) -> None:
+    """Sets the options to what a player plays best; the artist may change them then."""
+    best = asdict(ExportOptions())
+    if operator.player != _ANY:
+        best |= players.best_options(operator.player)
+        if operator.kind not in (endings := players.PLAYERS[operator.player].endings):
+            operator.kind = endings[0]
+    operator.clips = best["clips"]
+    # The property has no number for all.
+    operator.influences = best["influences"] or _MOST
+
+
 @with_options(ExportOptions)
 class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.types.Operator):
     bl_label = "Export"
     bl_description = "Write the scene for engines: bones, weights and animation. This file stays as it is"
     saying = "Sinew exports"
     stopped = "Export stopped; nothing was written"
+
+    # Before what it chooses, so that scripts which give both have theirs.
+    player: bpy.props.EnumProperty(
+        name="For",
+        description="Chooses what this player plays best",
+        items=[
+            (_ANY, "Any", "What most players take"),
+            *((name, its.name, players.takes(name)) for name, its in players.PLAYERS.items() if its.endings),
+        ],
+        update=_choose,
+    )
 
     kind: bpy.props.EnumProperty(
         name="To",
@@ -68,13 +96,24 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
     def draw(self, _context: bpy.types.Context) -> None:
         layout = self.layout
         layout.use_property_split = True
-        of_kind = ("influences",) if self.kind == ".glb" else ()
-        for name in ("kind", *of_kind, "folder", "overwrite", "verify"):
+        of_kind = _OF_KIND.get(self.kind, ())
+        for name in ("player", "kind", *of_kind, "folder", "overwrite", "verify"):
             layout.prop(self, name)
-        if of_kind and self.influences > players.FOUR:
-            draw_text(layout, players.more_than_four(), icon="INFO")
+        if self.player != _ANY:
+            for sentence in self.of_player():
+                draw_text(layout, sentence, icon="INFO", pixels=stepped.DIALOG)
+        elif self.kind == ".glb" and self.influences > players.FOUR:
+            draw_text(layout, players.more_than_four(), icon="INFO", pixels=stepped.DIALOG)
+
+    def of_player(self) -> list[Phrase]:
+        if self.kind not in players.PLAYERS[self.player].endings:
+            return []
+        influences = self.influences if self.kind == ".glb" else 0
+        return players.sentences(self.player, self.kind, influences, self.clips)
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
+        if self.player != _ANY:
+            players.check_ending(self.player, self.kind)
         self.path = self.target(self.kind)
         files.check_free(self.path, self.overwrite)
         deformed = attach.deformed_meshes(list(context.scene.objects))
@@ -91,6 +130,9 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         for check in checks:
             for sentence in check.sentences(characters.length_unit(context.scene)):
                 self.report({"INFO"}, f"{check.mesh}: {tr(sentence)}")
+        if self.verify and self.player != _ANY:
+            for sentence in self.of_player():
+                self.report({"INFO"}, tr(sentence))
         for sentence in self.outcome["left_out"]:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, tr("Wrote {path}", path=self.path))

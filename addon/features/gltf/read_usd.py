@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import SinewError
+from ...io.usd import has_pxr, pxr
 from .played import Played, of_sum_one
-from .usd_scales import has_pxr, pxr
 
 
 def read_usd(path: Path) -> list[Played]:

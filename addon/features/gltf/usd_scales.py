@@ -8,7 +8,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -16,21 +15,11 @@ import bpy
 import numpy as np
 
 from ...io import armature_io
+from ...io.usd import has_pxr, pxr
 from .export_check import plain, relative
 
 # Nearer samples than this are left out by Blender's exporter; a distance that is worth a word.
 _LEFT_OUT, _SMALL = 0.01, 0.001
-
-
-def has_pxr() -> bool:
-    """Whether this Blender lends USD's Python modules, as from 4.4 on."""
-    return hasattr(bpy.utils, "expose_bundled_modules")
-
-
-def pxr(*names: str) -> list[Any]:
-    """USD's modules of these names."""
-    bpy.utils.expose_bundled_modules()
-    return [import_module(f"pxr.{name}") for name in names]
 
 
 @dataclass

@@ -36,6 +36,7 @@ class Finding:
     advice    one sentence, what to do
     groups    the vertex groups that have it, for faults of groups
     frames    the frames where it was seen, for faults that depend on the pose
+    bone      the one that has it, for faults of one bone's weights
     """
 
     name: str
@@ -45,6 +46,12 @@ class Finding:
     advice: str
     groups: tuple[str, ...] = ()
     frames: tuple[float, ...] = ()
+    bone: str = ""
+
+    @property
+    def key(self) -> str:
+        """Tells it from all others of a mesh."""
+        return f"{self.name} {self.bone}" if self.bone else self.name
 
     @property
     def count(self) -> int:
@@ -60,6 +67,7 @@ class Finding:
             "vertices": self.vertices.tolist(),
             "groups": list(self.groups),
             "frames": list(self.frames),
+            "bone": self.bone,
             "meaning": self.meaning,
             "advice": self.advice,
         }

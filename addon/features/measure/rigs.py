@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -14,6 +14,7 @@ from ...attach import attach
 from ...io import armature_io
 from ...skinning.rig import Bones
 from . import battery
+from .character import Skeleton
 from .live import Moment
 
 
@@ -23,12 +24,14 @@ class Rig:
     bones   of the armature, which know the skin of all meshes
     world   float64 [4, 4], of the armature
     moving  names of the bones that move vertices
+    first   the number of its first bone in skeleton_of()
     """
 
     armature: bpy.types.Object
     bones: Bones
     world: np.ndarray
     moving: set[str] = field(default_factory=set)
+    first: int = 0
 
     @property
     def is_moving(self) -> np.ndarray:
@@ -39,6 +42,33 @@ class Rig:
     def battery(self) -> battery.Battery:
         """Within the limits that its bones have."""
         return battery.Battery(self.bones, armature_io.read_limits(self.armature), self.is_moving)
+
+
+def skeleton_of(rigs: Sequence[Rig]) -> Skeleton:
+    """Returns the bones of all, in this order."""
+    names: list[str] = []
+    roles: list[str] = []
+    parts = []
+    for number, rig in enumerate(rigs):
+        bones = rig.bones
+        rest = rig.world @ bones.rest[: len(bones.names)].astype(np.float64)
+        names += bones.names
+        roles += rig.battery.roles()
+        side, mirror = battery.sides(bones.names)
+        parts.append(
+            (
+                rest,
+                bones.limb_ends(rest),
+                np.where(bones.deforming_parents >= 0, bones.deforming_parents + rig.first, -1),
+                bones.deform,
+                side,
+                np.where(mirror >= 0, mirror + rig.first, -1),
+                np.full(len(side), number),
+            )
+        )
+    rest, tails, above, deform, side, mirror, rig_of = map(np.concatenate, zip(*parts, strict=True))
+    rig_names = tuple(rig.armature.name for rig in rigs)
+    return Skeleton(tuple(names), rest, tails, above, deform, tuple(roles), side, mirror, rig_of, rig_names)
 
 
 def rigs_of(now: Moment) -> list[Rig]:

@@ -114,7 +114,7 @@ def _overview(comparison: Comparison, method: str) -> list[str]:
 
 
 def _where(finding: Finding) -> str:
-    where = []
+    where = [f"Bone: {finding.bone}"] if finding.bone else []
     if finding.groups:
         where.append(f"Groups: {', '.join(finding.groups)}")
     if len(finding.vertices):

@@ -14,7 +14,7 @@ from ...base.steps import result_of
 from ...deform import characters
 from ...features.flex import flex as bending
 from ...features.flex import page as flex_page
-from ...features.flex.limits import Table, read_table
+from ...features.measure.limits import Table, read_table
 from ...io import files
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import json
 import sys
+from pathlib import Path
 
 import bpy
 import numpy as np
@@ -78,6 +79,14 @@ def test_methods_is_the_table():
     text = run_sinew("methods").stdout
     for method in METHODS.values():
         assert method.label in text
+
+
+def test_json_is_all_that_is_printed_where_a_colour_configuration_is_set():
+    """As in the pipelines of many studios: Blender 5.3 prints which it uses."""
+    config = Path(bpy.utils.system_resource("DATAFILES")) / "colormanagement" / "config.ocio"
+    assert config.exists()
+    printed = run_program("methods", "--json", env_more={"OCIO": str(config)}).stdout
+    assert json.loads(printed)["methods"]
 
 
 def test_info(arm_file):

@@ -8,9 +8,11 @@ import struct
 from pathlib import Path
 
 import bpy
+import numpy as np
 import pytest
+import scenes
 from sinew_addon.base.errors import SinewError
-from sinew_addon.io import files
+from sinew_addon.io import files, usd
 
 
 def write_glb(path, header, binary):
@@ -66,3 +68,94 @@ def test_compressed_by_what_bpy_has_no_library_for(empty_file, tmp_path, capfd, 
     assert not bpy.data.objects
     assert not bpy.data.meshes
     assert "Traceback" not in capfd.readouterr().err
+
+
+def usd_with(tmp_path, change):
+    """An arm that Blender exported, whose skeleton's animation is then changed. Returns the file."""
+    scenes.placed_arm()
+    scene = bpy.context.scene
+    scene.frame_start, scene.frame_end = 1, 11
+    path = tmp_path / "arm.usdc"
+    bpy.ops.wm.usd_export(filepath=str(path), export_animation=True, export_armatures=True)
+    usd_module, skel = usd.pxr("Usd", "UsdSkel")
+    stage = usd_module.Stage.Open(str(path))
+    (prim,) = [each for each in stage.Traverse() if each.IsA(skel.Animation)]
+    own = skel.Animation(prim)
+    change(own.GetTranslationsAttr(), own.GetRotationsAttr(), own.GetScalesAttr())
+    stage.GetRootLayer().Save()
+    return path
+
+
+def rewrite(attribute, times):
+    """Leaves samples at these times alone; None: the value of the last one, without a time."""
+    values = [(time, attribute.Get(11.0 if time is None else time)) for time in times]
+    attribute.Clear()
+    for time, value in values:
+        attribute.Set(value) if time is None else attribute.Set(value, time)
+
+
+def as_it_is(*_channels):
+    pass
+
+
+def without_times(*channels):
+    for channel in channels:
+        rewrite(channel, [None])
+
+
+def apart(translations, rotations, scales):
+    rewrite(translations, [1.0, 6.0, 11.0])
+    rewrite(rotations, [1.0, 11.0])
+    rewrite(scales, [None])
+
+
+def together(translations, rotations, scales):
+    rewrite(translations, [1.0, 6.0, 11.0])
+    rewrite(rotations, [1.0, 6.0, 11.0])
+    rewrite(scales, [None])
+
+
+def off(path):
+    """How far Blender has vertices from what UsdSkel plays, at most."""
+    import other_usd
+
+    frames = [3.0, 6.0, 9.0]
+    _rest, expected = other_usd.points_at(path, frames)
+    (obj,) = [each for each in bpy.context.scene.objects if each.type == "MESH"]
+    most = 0.0
+    for frame, points in zip(frames, expected, strict=True):
+        bpy.context.scene.frame_set(int(frame))
+        shown = scenes.world_points(obj)
+        most = max(most, float(np.abs(shown - points).max()))
+    return most
+
+
+@pytest.mark.outer_versions
+@pytest.mark.skipif(not usd.has_pxr(), reason="Blender lends USD's modules from 4.4 on")
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (as_it_is, None),
+        (together, None),
+        (without_times, "its pose has no time sample, and Blender's importer leaves it out; give it one"),
+        (apart, "its rotations have no samples at some times of other channels, and Blender's importer does"),
+    ],
+)
+def test_what_the_importer_of_usd_leaves_out(empty_file, tmp_path, change, said):
+    path = usd_with(tmp_path, change)
+    sentences = files.open_file(path)
+    assert (off(path) > 0.1) == (said is not None)
+    if said is None:
+        assert sentences == []
+    else:
+        (sentence,) = sentences
+        assert said in sentence
+
+
+@pytest.mark.outer_versions
+def test_a_usd_file_that_is_cut_off(empty_file, tmp_path, capfd):
+    path = tmp_path / "cut.usdc"
+    path.write_bytes(b"PXR-USDC" + bytes(100))
+    with pytest.raises(SinewError, match=r"cut\.usdc: Blender can not read it: "):
+        files.open_file(path)
+    assert not bpy.data.objects

@@ -3,11 +3,12 @@
 
     ./dev corpus FOLDER... [--exports] [--json FILE] [--timeout SECONDS]
 
-Every .blend, .glb, .gltf and .fbx below the folders is opened, described (`sinew info`), checked (`sinew
-check`) and deformed: linear blend and dual quaternions must equal the Armature modifier, at frames and in
-random poses, and all other methods must be finite. It is saved and opened with Sinew on it, Sinew is removed,
-which must leave nothing, and it is exported to glTF, USD and FBX: each difference between what such a file
-plays and what was seen must have a known cause. A second table counts the causes. --exports only exports.
+Every .blend, .glb, .gltf, .fbx and USD file below the folders is opened, described (`sinew info`), checked
+(`sinew check`) and deformed: linear blend and dual quaternions must equal the Armature modifier, at frames
+and in random poses, and all other methods must be finite. It is saved and opened with Sinew on it, Sinew is
+removed, which must leave nothing, and it is exported to glTF, USD and FBX: each difference between what such
+a file plays and what was seen must have a known cause. A second table counts the causes. --exports only
+exports.
 
 A file is a row of a table, also if it can not be opened, crashes Blender or takes too long. Ctrl-C keeps
 what is done. Exit status 1: a file failed. Files are only read.
@@ -57,9 +58,10 @@ def examine(task: dict, report: worker.Report) -> dict:
     """What a Blender of its own finds of the file "source" of a task.
 
     "vertices", "bones": of the meshes that Sinew deforms; "refused": a sentence for each other one that an
-    armature deforms; "worst": the largest distance from the Armature modifier by method, as a part of the
-    diagonal; "by": routes taken; "exports": by format the largest distance of each cause, as a part of the
-    diagonal; "failures": a sentence for each thing that is not as it should be
+    armature deforms; "notes": what opening the file said; "worst": the largest distance from the Armature
+    modifier by method, as a part of the diagonal; "by": routes taken; "exports": by format the largest
+    distance of each cause, as a part of the diagonal; "failures": a sentence for each thing that is not as it
+    should be
     """
     with tempfile.TemporaryDirectory() as folder:
         one = _File(Path(task["source"]), Path(folder), report)
@@ -77,7 +79,7 @@ class _File:
         self.failures: list[str] = []
 
     def examine(self, only_exports: bool) -> None:
-        files.open_file(self.source)
+        self.row["notes"] = files.open_file(self.source)
         # Saving drops some of it, and opening then more.
         bpy.data.orphans_purge(do_recursive=True)
         bpy.ops.wm.save_as_mainfile(filepath=str(self.plain))
@@ -299,7 +301,9 @@ def _result(row: dict) -> str:
         return "failed"
     if not row["meshes"]:
         return "no skin"
-    return f"refused: {'; '.join(row['refused'])}" if row["refused"] else "ok"
+    if row["refused"]:
+        return f"refused: {'; '.join(row['refused'])}"
+    return "; ".join(["ok", *row["notes"]])
 
 
 def _line(row: dict, number: int, count: int) -> str:

@@ -41,7 +41,15 @@ def found(obj: bpy.types.Object) -> dict[str, list[int]]:
     return {finding.name: finding.vertices.tolist() for finding in diagnose.of(obj).findings}
 
 
+def of_poses(obj: bpy.types.Object) -> dict[str, list[int]]:
+    """Without those of weights: what of twisted_arm() is beside other bones follows the first."""
+    return {name: vertices for name, vertices in found(obj).items() if name != "astray"}
+
+
 def selected(obj: bpy.types.Object) -> list[int]:
+    if obj.mode == "WEIGHT_PAINT":
+        assert obj.data.use_paint_mask_vertex
+        return [vertex.index for vertex in obj.data.vertices if vertex.select]
     assert obj.mode == "EDIT"
     return [vertex.index for vertex in bmesh.from_edit_mesh(obj.data).verts if vertex.select]
 
@@ -92,12 +100,12 @@ def test_findings_of_poses_at_a_frame_and_in_an_action():
     obj, _armature = twisted_arm()
     scenes.add_sinew(obj, "dq")
     bpy.ops.sinew.check()
-    assert found(obj) == {}
+    assert of_poses(obj) == {}
     bpy.context.scene.frame_set(11)
     bpy.ops.sinew.check()
     # Three bones, each less than 180 degrees from the next and more from the one after that: the order
     # decides.
-    assert found(obj) == {"order_of_groups": [100]}
+    assert of_poses(obj) == {"order_of_groups": [100]}
     bpy.context.scene.frame_set(10)
     bpy.ops.sinew.check()
     assert found(obj)["near_half_turn"] == [150]
@@ -141,7 +149,8 @@ def test_select_selects_exactly_those(name, start):
     assert bpy.context.object == obj
     assert selected(obj) == expected
     assert other.mode == "OBJECT"
-    assert tuple(bpy.context.scene.tool_settings.mesh_select_mode) == (True, False, False)
+    is_vertices = tuple(bpy.context.scene.tool_settings.mesh_select_mode) == (True, False, False)
+    assert is_vertices or start == "WEIGHT_PAINT"
 
 
 def test_select_shows_what_is_hidden_and_no_more():

@@ -7,10 +7,11 @@ import bpy
 import numpy as np
 import pytest
 import scenes
+from planted import HUMAN, Rig
 from sinew_addon.base.errors import SinewError
 from sinew_addon.features.diagnose import diagnose, mending
 from sinew_addon.io import mesh_io
-from test_diagnostics_panel import LEFTOVER, MANY, SMALL, UNWEIGHTED, faulty_arm, found, twisted_arm
+from test_diagnostics_panel import LEFTOVER, MANY, SMALL, UNWEIGHTED, faulty_arm, found, of_poses, twisted_arm
 
 pytestmark = pytest.mark.long_term
 
@@ -130,7 +131,7 @@ def test_smoothing_goes_on_until_the_order_decides_nothing_more():
     obj, _armature = twisted_arm()
     bpy.context.scene.frame_set(11)
     bpy.ops.sinew.check()
-    assert found(obj) == {"order_of_groups": [100]}
+    assert of_poses(obj) == {"order_of_groups": [100]}
     before = dense(obj)
     mend(obj, "order_of_groups", "smooth")
     after = dense(obj)
@@ -158,3 +159,46 @@ def test_it_says_why_it_can_not():
     bpy.context.view_layer.update()
     with pytest.raises(RuntimeError, match="press Check again"):
         mend(obj, "many_influences", "limit")
+
+
+def stray(obj: bpy.types.Object) -> dict[str, list[int]]:
+    """Vertices by the keys of findings of one bone."""
+    return {each.key: sorted(each.vertices.tolist()) for each in diagnose.of(obj).findings if each.bone}
+
+
+def test_a_stroke_of_a_far_bone_is_found_and_taken_off(real_rig):
+    rig = Rig.open(real_rig("human.blend"), HUMAN)
+    patch = sorted(rig.patch("shin.L", 40).tolist())
+    before, group = rig.weights.copy(), rig.group("hand.L")
+    rig.give(np.array(patch), "hand.L", 0.4)
+    rig.weights[patch[:5]] = 0.0
+    rig.weights[patch[:5], group] = 1.0
+    rig.store()
+    obj = rig.obj
+    bpy.context.view_layer.objects.active = obj
+    bpy.ops.sinew.check()
+    known = stray(obj)
+    assert known.pop("bleed hand_l") == patch
+    assert bpy.ops.sinew.mend(object=obj.name, finding="bleed hand_l", how="unbind") == {"FINISHED"}
+    after = dense(obj)
+    # Those that had no other bone have those around them; the others what they had before the stroke.
+    sums = before[patch[5:]].sum(axis=1, keepdims=True)
+    np.testing.assert_allclose(after[patch[5:]], before[patch[5:]] / sums, atol=1e-5)
+    np.testing.assert_allclose(after[patch[:5]].sum(axis=1), 1.0, atol=1e-5)
+    assert not after[patch, group].any()
+    others = np.setdiff1d(np.arange(len(after)), patch)
+    np.testing.assert_allclose(after[others], before[others], atol=1e-6)
+    assert stray(obj) == known
+
+
+def test_a_locked_group_keeps_its_stroke(real_rig):
+    rig = Rig.open(real_rig("human.blend"), HUMAN)
+    rig.give(rig.patch("shin.L", 40), "hand.L", 0.4)
+    rig.store()
+    rig.obj.vertex_groups["hand_l"].lock_weight = True
+    bpy.context.view_layer.objects.active = rig.obj
+    bpy.ops.sinew.check()
+    before = dense(rig.obj)
+    with pytest.raises(RuntimeError, match="the group of the bone is locked"):
+        bpy.ops.sinew.mend(object=rig.obj.name, finding="bleed hand_l", how="unbind")
+    np.testing.assert_array_equal(dense(rig.obj), before)

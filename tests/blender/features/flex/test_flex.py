@@ -19,7 +19,7 @@ from program import ran, run_sinew
 from sinew_addon.attach import properties
 from sinew_addon.base.steps import result_of
 from sinew_addon.features.flex import flex
-from sinew_addon.features.flex.limits import Table
+from sinew_addon.features.measure.limits import Table
 from whole_file import assert_same, content
 
 pytestmark = pytest.mark.long_term
@@ -60,6 +60,28 @@ def test_a_planted_fault_is_named_at_its_joint(real_rig, of_human, plant: Plant)
     new = planted.found(planted.verdict()) - of_human
     wanted = {(rig.names[joint], name) for joint in plant.joints for name in plant.findings}
     assert new & wanted, new
+
+
+@pytest.mark.parametrize("near", ["shin.L", "thigh.L"])
+def test_what_a_stroke_causes_is_told_below_it(real_rig, of_human, near):
+    """A stroke of the hand tears leg and arm: it comes first, and they have no advice of their own."""
+    rig = Rig.open(real_rig("human.blend"), HUMAN)
+    rig.give(rig.patch(near, 40), "hand.L", 0.4)
+    rig.store()
+    (first, others), *rest = planted.verdict().by_cause()
+    assert (first.joint, first.limit.name) == ("hand_l", "bleed")
+    assert {"calf_l", "lowerarm_l", "hand_l"} <= {each.joint for each in others}
+    assert all("hand_l: Bleeding weights" in each.advice for each in others)
+    assert {(own.joint, own.limit.name) for own, _others in rest} <= of_human
+
+
+def test_no_limb_loses_more_than_its_volume(real_rig):
+    rig = Rig.open(real_rig("human.blend"), HUMAN)
+    rig.give(rig.patch("shin.L", 40), "hand.L", 0.4)
+    rig.store()
+    lost = [each.value for each in planted.verdict().findings if each.limit.name == "volume_loss"]
+    assert lost
+    assert max(lost) <= 1.0
 
 
 def test_only_the_fingers_of_human_fail(of_human):

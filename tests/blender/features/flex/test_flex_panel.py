@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import read_page
 import scenes
+from sinew_addon.features.diagnose import diagnose
 from sinew_addon.features.flex import feature
 from sinew_addon.features.flex.verdict import Finding
 from sinew_addon.features.variants import choices
@@ -79,8 +80,26 @@ def test_a_click_goes_to_the_place(arm_with_a_bare_patch):
     assert bpy.ops.sinew.flex_place(joint=joint, finding=place) == {"FINISHED"}
     assert obj.mode == "EDIT"
     bpy.ops.object.mode_set(mode="OBJECT")
-    assert [vertex.index for vertex in obj.data.vertices if vertex.select] == [finding.vertex]
+    assert [vertex.index for vertex in obj.data.vertices if vertex.select] == bare
     assert finding.vertex in bare
+
+
+def test_what_comes_from_a_patch_is_told_below_it_and_goes_with_it(arm_with_a_bare_patch):
+    """An artist mends it where it is told, by one undo step."""
+    obj, _armature, bare = arm_with_a_bare_patch
+    bpy.ops.sinew.flex()
+    (first, others), *_rest = feature.results[bpy.context.scene.session_uid].verdict.by_cause()
+    assert first.limit.name == "unweighted"
+    assert {"stretch"} <= {each.limit.name for each in others}
+    assert {each.caused_by for each in others} == {(first.joint, first.limit)}
+    key = f"unweighted {first.joint}"
+    assert diagnose.has(obj, key)
+    assert bpy.ops.sinew.mend(object=obj.name, finding=key, how="fill") == {"FINISHED"}
+    assert not diagnose.has(obj, key)
+    assert all(obj.data.vertices[vertex].groups for vertex in bare)
+    bpy.ops.sinew.flex()
+    left = feature.results[bpy.context.scene.session_uid].verdict.findings
+    assert "unweighted" not in {each.limit.name for each in left}
 
 
 def test_a_click_poses_the_bone_as_it_was_bent(arm_with_a_bare_patch):

@@ -317,6 +317,21 @@ def test_envelopes(scene, tmp_path):
     assert mesh["causes"]["influences"]["largest"] > 1e-2 * mesh["diagonal"]
 
 
+@pytest.mark.parametrize("multiplied", [False, True])
+def test_envelopes_of_bendy_bones(empty_file, tmp_path, multiplied):
+    """The weights of the plain bones have the envelopes in them."""
+    obj = make_bendy(unequal=False)
+    rig = obj.parent
+    obj.modifiers["Armature"].use_bone_envelopes = not multiplied
+    for group in list(obj.vertex_groups)[1:] if not multiplied else ():
+        group.remove([vertex.index for vertex in obj.data.vertices if vertex.co.x > 2.2])
+    for bone in rig.data.bones:
+        bone.envelope_distance, bone.use_envelope_multiply = 0.6, multiplied
+        bone.head_radius = bone.tail_radius = 0.1
+    rig.data.bones[0].bbone_segments = 1
+    assert not found_causes(exported(tmp_path, "--influences", "16"))
+
+
 def test_normals(empty_file, tmp_path):
     """A tube along a bone that is scaled across: its faces' normals are at odd multiples of 15 degrees."""
     _obj, rig = scenes.make_arm(bones=1)
@@ -384,6 +399,27 @@ def test_a_mirrored_bone_in_usd(scene, tmp_path, method, scale):
     words = ("export", tmp_path / "arm.blend", "--method", method, "--out", tmp_path / "a.usdc")
     said = "are mirrored, such as bone.2" in run_sinew(*words).stderr
     assert said == (method == "dq" and scale < 0.0)
+
+
+def test_two_bones_of_one_name_in_usd(scene, tmp_path):
+    """The exporter would write a skeleton that nobody can read, and say nothing."""
+    _obj, armature = scene
+    armature.data.bones[0].name, armature.data.bones[1].name = "arm.L", "arm_L"
+    scenes.save(tmp_path / "arm.blend")
+    words = ("export", tmp_path / "arm.blend", "--method", "lbs", "--out")
+    # Of different parents, their paths differ.
+    run_sinew(*words, tmp_path / "arm.usdc")
+    (tmp_path / "arm.usdc").unlink()
+    bpy.context.view_layer.objects.active = armature
+    bpy.ops.object.mode_set(mode="EDIT")
+    armature.data.edit_bones["arm_L"].parent = None
+    bpy.ops.object.mode_set(mode="OBJECT")
+    scenes.save(tmp_path / "arm.blend")
+    said = program.complaint(run_sinew(*words, tmp_path / "arm.usdc", status=1).stderr)
+    assert said.endswith("rename one")
+    assert "arm.L and arm_L" in said
+    assert not (tmp_path / "arm.usdc").exists()
+    run_sinew(*words, tmp_path / "arm.glb")
 
 
 def test_more_than_four_influences(scene, tmp_path):

@@ -29,7 +29,7 @@ def test_the_header_says_what_each_key_uses():
     properties.of(obj).enabled = True
     for number in range(12):
         bpy.ops.sinew.add_variant(name=f"V{number}")
-    assert "9 V" in said()
+    assert "9 \u25cf V6" in said()
     assert "10 " not in said()
 
 

@@ -13,7 +13,7 @@ import trimesh
 from closed_tube import IDENTITY, LENGTH, RADIUS, RINGS, SIDES, Tube, influences_of
 from program import ran
 from rigs import about, random_motion, transform
-from sinew_addon.features.flex.limits import LIMITS
+from sinew_addon.features.measure.limits import LIMITS
 from sinew_addon.features.measure.metrics import METRICS, FrameOfRig, Gauge, Measured, Shape
 from sinew_addon.skinning.surface import Parts, Surface, coincident_vertices, joined
 

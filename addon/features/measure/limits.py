@@ -4,13 +4,14 @@ from."""
 
 from __future__ import annotations
 
+import math
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ...base.errors import WrongUse
-from ..measure.battery import JOINTS, Move
+from .battery import JOINTS, Move
 
 
 @dataclass(frozen=True)
@@ -38,6 +39,11 @@ class Limit:
 
     def is_beyond(self, value: float) -> bool:
         return value < self.value if self.least else value > self.value
+
+    def times(self, value: float) -> float:
+        """How far a value is beyond: 1 at the limit; infinite where none is allowed."""
+        over, under = (self.value, value) if self.least else (value, self.value)
+        return over / under if under > 0.0 else math.inf
 
     def number(self, value: float) -> str:
         """Without its unit."""
@@ -79,7 +85,7 @@ LIMITS: dict[str, Limit] = {
             2.0,
             "sizes of the bone",
             "The bone moves vertices that it is far from over the surface.",
-            "Select the place and remove the bone's group from it (Weights > Clean, or Limit Total).",
+            "Diagnostics > Bleeding weights > Remove Influence.",
         ),
         Limit(
             "astray",
@@ -87,7 +93,7 @@ LIMITS: dict[str, Limit] = {
             3.0,
             "girths",
             "Vertices follow this bone most, though others are much nearer.",
-            "Select the place, and assign it to the bones around it.",
+            "Diagnostics > Astray > Remove Influence, or Smooth.",
         ),
         Limit(
             "other_side",
@@ -95,7 +101,7 @@ LIMITS: dict[str, Limit] = {
             0.02,
             "%",
             "The bone moves vertices of the figure's other side.",
-            "Select the place and remove the bone's group from it; or mirror the weights from the good side.",
+            "Diagnostics > Weights of the other side > Remove Influence, or From Other Side.",
         ),
         Limit(
             "asymmetry",

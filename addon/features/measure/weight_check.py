@@ -10,8 +10,8 @@ from typing import NamedTuple
 import numpy as np
 
 from ...skinning.surface import components
-from .character import Character
-from .measures import Place
+from .character import Character, Place
+from .limits import LIMITS
 
 # A weight that is no more than this moves a vertex by too little to be seen.
 SEEN = 0.03
@@ -27,14 +27,28 @@ CUSTOM, ROLLED = 0.8, 10.0
 class Value(NamedTuple):
     """What one check measures at one bone.
 
-    vertices  how many are concerned
+    vertices  int [n], those that are concerned
     """
 
     name: str
     bone: int
     value: float
     place: Place | None = None
-    vertices: int = 0
+    vertices: np.ndarray = np.zeros(0, int)
+
+
+class _Sides(NamedTuple):
+    """Of a rig with bones of two sides.
+
+    left, right  int [pairs], bones
+    across       [3], from the right to the left, of length 1
+    middle       [3], a point of the plane between
+    """
+
+    left: np.ndarray
+    right: np.ndarray
+    across: np.ndarray
+    middle: np.ndarray
 
 
 class WeightCheck:
@@ -42,14 +56,26 @@ class WeightCheck:
         self._character, self._skeleton = character, character.skeleton
         self._moving = np.flatnonzero(character.moving)
 
+    def stray(self) -> Iterator[Value]:
+        """Weights of bones where these should have none."""
+        if len(self._moving):
+            yield from self._bleeding()
+            yield from self._astray()
+        for sides in map(self._sides_of, np.unique(self._skeleton.rig)):
+            if sides is not None:
+                yield from self._other_side(sides)
+
     def values(self) -> Iterator[Value]:
         yield from self._unweighted()
         yield from self._inert()
         if len(self._moving):
             yield from self._astray()
             yield from self._bleeding()
-        for rig in np.unique(self._skeleton.rig):
-            yield from self._sides(int(rig))
+        for sides in map(self._sides_of, np.unique(self._skeleton.rig)):
+            if sides is not None:
+                yield from self._rolls(sides)
+                yield from self._other_side(sides)
+                yield from self._asymmetry(sides)
 
     @cached_property
     def _distances(self) -> np.ndarray:
@@ -90,7 +116,7 @@ class WeightCheck:
         nearest = bones[np.argmin(apart, axis=0)]
         for bone in np.unique(nearest):
             own = bare[nearest == bone]
-            yield Value("unweighted", int(bone), float(len(own)), self._place(own[0]), len(own))
+            yield Value("unweighted", int(bone), float(len(own)), self._place(own[0]), own)
 
     def _inert(self) -> Iterator[Value]:
         """Bones without weights whose other side has some."""
@@ -99,34 +125,38 @@ class WeightCheck:
             if moving[mirror[bone]]:
                 yield Value("inert", int(bone), 1.0)
 
-    def _astray(self) -> Iterator[Value]:
-        """How much farther vertices are from the bone that they follow most than from the nearest, in girths
-        of that bone, times how much more they follow it: two that share a vertex alike are both right."""
+    @cached_property
+    def _beyond(self) -> np.ndarray:
+        """float64 [vertices]: how much farther each is from the bone that it follows most than from the
+        nearest, in girths of that bone, times how much more it follows it: two that share a vertex alike are
+        both right."""
         character = self._character
         weighted = np.flatnonzero(character.heaviest >= 0)
         heaviest, nearest = character.heaviest[weighted], self._distances[weighted].argmin(axis=1)
         beyond = self._distances[weighted, heaviest] - self._distances[weighted, nearest]
         beyond *= character.weights[weighted, heaviest] - character.weights[weighted, nearest]
-        for bone in np.unique(heaviest):
+        found = np.zeros(len(character.points))
+        found[weighted] = beyond / self._sizes[heaviest]
+        return found
+
+    def _astray(self) -> Iterator[Value]:
+        """Vertices that follow a bone most though others are much nearer."""
+        heaviest = self._character.heaviest
+        for bone in np.unique(heaviest[heaviest >= 0]):
             core = np.flatnonzero(heaviest == bone)
-            values = beyond[core] / self._sizes[bone]
+            values = self._beyond[core]
             worst = int(values.argmax())
-            yield Value(
-                "astray",
-                int(bone),
-                float(values[worst]),
-                self._place(weighted[core[worst]]),
-                int((values > 0.5 * values[worst]).sum()),
-            )
+            patch = core[values > 0.5 * values[worst]]
+            yield Value("astray", int(bone), float(values[worst]), self._place(core[worst]), patch)
 
     def _bleeding(self) -> Iterator[Value]:
         """How far over the surface vertices are from those that follow a bone most, without weights of that
         bone on the way; in sizes of the bone."""
         character, skeleton = self._character, self._skeleton
-        pairs = character.joined
+        pairs, astray = character.joined, LIMITS["astray"].value
         for bone in self._moving:
             weights = character.weights[:, bone]
-            core = (character.heaviest == bone) & (weights > SEEN)
+            core = (character.heaviest == bone) & (weights > SEEN) & (self._beyond <= astray)
             some = weights > SEEN
             if not core.any() or core.all():
                 continue
@@ -140,42 +170,45 @@ class WeightCheck:
             suspect = far[apart > 0.5 * size]
             if not len(suspect):
                 continue
-            over = _over_surface(character.points, pairs, core)[suspect]
+            over = _over_surface(character.points, pairs, core, suspect)
             # Another shell is as far as it is through the air.
             over = np.where(np.isfinite(over), over, apart[apart > 0.5 * size]) / size
             seen = over * np.minimum(weights[suspect] / 0.1, 1.0)
             worst = int(seen.argmax())
-            yield Value("bleed", int(bone), float(seen[worst]), self._place(suspect[worst]), len(suspect))
+            yield Value("bleed", int(bone), float(seen[worst]), self._place(suspect[worst]), suspect)
 
-    def _sides(self, rig: int) -> Iterator[Value]:
-        character, skeleton = self._character, self._skeleton
+    def _sides_of(self, rig: int) -> _Sides | None:
+        """None where no bones have another side."""
+        skeleton = self._skeleton
         left = np.flatnonzero((skeleton.rig == rig) & (skeleton.mirror >= 0) & (skeleton.side > 0))
         right = skeleton.mirror[left]
         across = (skeleton.heads[left] - skeleton.heads[right]).sum(axis=0)
         if not np.linalg.norm(across) > 0.0:
-            return
-        across /= np.linalg.norm(across)
+            return None
         middle = (0.5 * (skeleton.heads[left] + skeleton.heads[right])).mean(axis=0)
-        yield from self._rolls(left, right, across)
-        offsets = (character.points - middle) @ across
-        for bone, sign in (*((b, 1.0) for b in left), *((b, -1.0) for b in right)):
-            own = sign * float((0.5 * (skeleton.heads[bone] + skeleton.tails[bone]) - middle) @ across)
-            weights = character.weights[:, bone]
+        return _Sides(left, right, across / np.linalg.norm(across), middle)
+
+    def _other_side(self, sides: _Sides) -> Iterator[Value]:
+        """The share of a bone's weights that is on the figure's other side."""
+        character, skeleton = self._character, self._skeleton
+        offsets = (character.points - sides.middle) @ sides.across
+        for bone, sign in (*((b, 1.0) for b in sides.left), *((b, -1.0) for b in sides.right)):
+            place = 0.5 * (skeleton.heads[bone] + skeleton.tails[bone]) - sides.middle
+            own, weights = sign * float(place @ sides.across), character.weights[:, bone]
             total = float(weights.sum())
             if total > 0.0 and own > 0.0:
                 wrong = sign * offsets < -BEYOND * own
                 share = float(weights[wrong].sum()) / total
                 if share > 0.0:
                     worst = int(np.argmax(np.where(wrong, weights, 0.0)))
-                    yield Value(
-                        "other_side", int(bone), share, self._place(worst), int(wrong[weights > SEEN].sum())
-                    )
-        yield from self._asymmetry(left, right, across, middle)
+                    there = np.flatnonzero(wrong & (weights > SEEN))
+                    yield Value("other_side", int(bone), share, self._place(worst), there)
 
-    def _rolls(self, left: np.ndarray, right: np.ndarray, across: np.ndarray) -> Iterator[Value]:
+    def _rolls(self, sides: _Sides) -> Iterator[Value]:
         """By how much a bone is rolled against the mirror image of its other side, in degrees. Rigs whose
         axes are not mirrored are all rolled alike: what most pairs have counts as none."""
         skeleton = self._skeleton
+        left, right, across, _middle = sides
         mirrored = np.identity(3) - 2.0 * np.outer(across, across)
         found: list[tuple[int, float]] = []
         for bone, other in zip(left, right, strict=True):
@@ -193,13 +226,11 @@ class WeightCheck:
             for (bone, _angle), each in zip(found, rolled, strict=True):
                 yield Value("roll", bone, each)
 
-    def _asymmetry(
-        self, left: np.ndarray, right: np.ndarray, across: np.ndarray, middle: np.ndarray
-    ) -> Iterator[Value]:
+    def _asymmetry(self, sides: _Sides) -> Iterator[Value]:
         """The share of a bone's weights that differs from those of its other side, where the mesh is the same
         on both."""
-        character = self._character
-        points = character.points
+        character, points = self._character, self._character.points
+        left, right, across, middle = sides
         image = _matches(
             points, points - 2.0 * np.outer((points - middle) @ across, across), character.diagonal
         )
@@ -226,7 +257,7 @@ class WeightCheck:
                     int(bone),
                     float(differs.sum()) / total,
                     self._place(known[worst]),
-                    int((differs > 0.1).sum()),
+                    known[differs > 0.1],
                 )
 
 
@@ -242,22 +273,30 @@ def _nearest(points: np.ndarray, others: np.ndarray) -> np.ndarray:
     return found
 
 
-def _over_surface(points: np.ndarray, pairs: np.ndarray, core: np.ndarray) -> np.ndarray:
-    """float64 [vertices]: the length of the shortest way along edges to one of `core`; infinite without."""
+def _over_surface(points: np.ndarray, pairs: np.ndarray, core: np.ndarray, wanted: np.ndarray) -> np.ndarray:
+    """float64 [wanted]: the length of the shortest way along edges to one of `core`, infinite without.
+
+    core    bool [vertices]
+    wanted  int, numbers of vertices
+    """
     ends = np.concatenate([pairs, pairs[:, ::-1]])
-    ends = ends[np.argsort(ends[:, 1], kind="stable")]
+    ends = ends[np.argsort(ends[:, 0], kind="stable")]
     offsets = points[ends[:, 0]] - points[ends[:, 1]]
-    lengths = np.sqrt(np.einsum("ij,ij->i", offsets, offsets))
-    targets, starts = np.unique(ends[:, 1], return_index=True)
+    lengths, others = np.sqrt(np.einsum("ij,ij->i", offsets, offsets)), ends[:, 1]
+    counts = np.bincount(ends[:, 0], minlength=len(points))
+    firsts = np.cumsum(counts) - counts
     found = np.where(core, 0.0, np.inf)
-    while len(ends):
-        shorter = found.copy()
-        through = np.minimum.reduceat(found[ends[:, 0]] + lengths, starts)
-        shorter[targets] = np.minimum(found[targets], through)
-        if np.array_equal(shorter, found):
-            break
-        found = shorter
-    return found
+    changed = np.flatnonzero(core)
+    # What is farther than all that are wanted shortens the way of none.
+    while len(changed) and found[changed].min() < found[wanted].max():
+        own = counts[changed]
+        edges = np.repeat(firsts[changed] - (np.cumsum(own) - own), own) + np.arange(own.sum())
+        through = np.repeat(found[changed], own) + lengths[edges]
+        shorter = through < found[others[edges]]
+        reached = others[edges[shorter]]
+        np.minimum.at(found, reached, through[shorter])
+        changed = np.unique(reached)
+    return found[wanted]
 
 
 def _matches(points: np.ndarray, wanted: np.ndarray, diagonal: float) -> np.ndarray:

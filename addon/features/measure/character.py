@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""A character as Flex sees it: one surface of all its meshes, and the bones of all its armatures."""
+"""A character as a whole: one surface of all its meshes, and the bones of all its armatures."""
 
 from __future__ import annotations
 
@@ -12,7 +12,15 @@ import numpy as np
 from ...skinning.influences import Influences, owners_of
 from ...skinning.surface import Surface
 from ...skinning.vectors import distances_from_axes
-from ..measure.metrics import Shape
+from .metrics import Shape
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where a measure is worst: a vertex of the character, with its point at rest."""
+
+    vertex: int
+    point: np.ndarray
 
 
 @dataclass(frozen=True)
@@ -134,6 +142,25 @@ class Character:
             doubles = np.flatnonzero(first != np.arange(len(first)))
             pairs = np.concatenate([pairs, np.stack([doubles, first[doubles]], axis=1)])
         return pairs.astype(np.int64)
+
+    def around(self, vertices: np.ndarray, rings: int) -> np.ndarray:
+        """bool [vertices]: those chosen, and as many rings of neighbours."""
+        found = np.zeros(self.surface.vertex_count, bool)
+        found[vertices] = True
+        for _ring in range(rings):
+            pairs = self.joined
+            found[pairs[found[pairs].any(axis=1)]] = True
+        return found
+
+    def by_mesh(self, vertices: np.ndarray) -> dict[str, np.ndarray]:
+        """Numbers of the vertices in their meshes, by these meshes' names."""
+        found, first = {}, 0
+        for name, count in self.meshes:
+            own = vertices[(vertices >= first) & (vertices < first + count)] - first
+            if len(own):
+                found[name] = own
+            first += count
+        return found
 
     def mesh_of(self, vertex: int) -> tuple[str, int]:
         """Returns a mesh's name, and the number of the vertex in it."""

@@ -1,0 +1,73 @@
+# SPDX-License-Identifier: GPL-3.0-or-later
+"""Finds weights of bones where these should have none, over all meshes of a character, without a pose."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...attach import attach
+from ...io import mesh_io
+from ...skinning.influences import joined as influences_of_all
+from ...skinning.surface import joined
+from ...skinning.vectors import transformed
+from .character import Character
+from .diagnostics import Finding
+from .limits import LIMITS
+from .rigs import Rig, skeleton_of
+from .subjects import Edited
+from .weight_check import WeightCheck
+
+# A patch of which so much is in one that was found before is the same.
+_SAME = 1.0 / 3.0
+
+
+def stray_weights(meshes: Sequence[Edited]) -> list[list[Finding]]:
+    """Returns those of each mesh, one for each bone and patch.
+
+    meshes  of one character or of several, with points at rest
+    """
+    found: list[list[Finding]] = [[] for _mesh in meshes]
+    character = _character(meshes)
+    known = np.zeros((len(character.skeleton.names), character.surface.vertex_count), bool)
+    numbers = {mesh.obj.name: number for number, mesh in enumerate(meshes)}
+    for value in WeightCheck(character).stray():
+        limit, own = LIMITS[value.name], known[value.bone]
+        if not limit.is_beyond(value.value) or own[value.vertices].mean() >= _SAME:
+            continue
+        own[value.vertices] = True
+        bone = character.skeleton.names[value.bone]
+        for name, vertices in character.by_mesh(value.vertices).items():
+            finding = Finding(value.name, limit.label, vertices, limit.meaning, limit.advice, bone=bone)
+            found[numbers[name]].append(finding)
+    return found
+
+
+def _character(meshes: Sequence[Edited]) -> Character:
+    rigs: dict[int, Rig] = {}
+    first = 0
+    for mesh in meshes:
+        armature, bones = attach.armature_of(mesh.obj), mesh.weighting.bones
+        rig = rigs.get(armature.session_uid)
+        if rig is None:
+            rig = rigs[armature.session_uid] = Rig(
+                armature, bones, np.array(armature.matrix_world), first=first
+            )
+            first += len(bones.names)
+        else:
+            rig.bones = rig.bones.with_skin_of(bones)
+    own = [rigs[attach.armature_of(mesh.obj).session_uid] for mesh in meshes]
+    influences = [mesh.weighting.influences_over_joints(mesh.rest_points) for mesh in meshes]
+    return Character(
+        joined([mesh_io.read_surface(mesh.obj.data) for mesh in meshes]),
+        np.concatenate(
+            [transformed(mesh.rest_points, rig.world) for mesh, rig in zip(meshes, own, strict=True)]
+        ),
+        influences_of_all(influences, [len(mesh.weighting.bones.rest) for mesh in meshes]),
+        np.concatenate(
+            [mesh.weighting.bones.owners + rig.first for mesh, rig in zip(meshes, own, strict=True)]
+        ),
+        skeleton_of(list(rigs.values())),
+        [(mesh.obj.name, len(mesh.rest_points)) for mesh in meshes],
+    )
