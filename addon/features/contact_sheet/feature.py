@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import bpy
 
@@ -161,6 +162,10 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
     def _refresh(self, context: bpy.types.Context) -> None:
         """Shows what has changed."""
         lead, shown = character.lead(context), self.shown
+        room = overlay.free_box(self.area, self.region)
+        if room != shown.place.room:
+            # The window has another size.
+            shown.place = replace(shown.place, room=room).moved(0.0, 0.0)
         now = variant_settings.read(lead) if lead is not None else None
         of_now = (row for row, each in enumerate(self.rows) if now is not None and each.agrees_with(now))
         shown.used = next(of_now, -1)
