@@ -12,7 +12,7 @@ step  milliseconds of one change of frame without drawing
 draw  milliseconds of drawing the window when nothing changed
 pose  milliseconds from rotating a bone until the 3D view that shows it is drawn
 late  how many of these drawings did not show it yet
-paint  milliseconds of one step of a brush stroke in weight paint, with what Blender evaluates for it, without drawing
+paint  milliseconds of one step of a brush stroke in weight paint, evaluated and not drawn
 """
 
 from __future__ import annotations
