@@ -73,8 +73,8 @@ def _parts() -> tuple[Feature, ...]:
 
 def _features() -> tuple[Feature, ...]:
     names = (
-        "variants suggest action_copy inbetween blend corrective compare motion_range flex heat auto_mix "
-        "diagnose bake gltf"
+        "variants suggest action_copy inbetween blend corrective compare motion_range contact_sheet flex "
+        "heat auto_mix diagnose bake gltf"
     )
     return tuple(import_module(f".features.{name}.feature", __package__).FEATURE for name in names.split())
 

@@ -12,6 +12,7 @@ step  milliseconds of one change of frame without drawing
 draw  milliseconds of drawing the window when nothing changed
 pose  milliseconds from rotating a bone until the 3D view that shows it is drawn
 late  how many of these drawings did not show it yet
+paint  milliseconds of one step of a brush stroke in weight paint, evaluated and not drawn
 """
 
 from __future__ import annotations
@@ -104,6 +105,7 @@ class Bench:
                 self.redraw(who, "draw", "DRAW_WIN_SWAP", 10)
                 yield 0.1
                 yield from self.pose(who)
+                yield from self.paint(who)
 
     def play(self, who: str) -> Iterator[float]:
         times: list[float] = []
@@ -162,16 +164,44 @@ class Bench:
         bone.rotation_quaternion = original
         yield 0.1
 
+    def paint(self, who: str) -> Iterator[float]:
+        obj = self.meshes[0]
+        bpy.context.view_layer.objects.active = obj
+        with in_view3d():
+            bpy.ops.object.mode_set(mode="WEIGHT_PAINT")
+        yield 0.5
+        with in_view3d():
+            bpy.ops.wm.tool_set_by_id(name="builtin.brush")
+        yield 0.5
+        step = {"name": "", "pressure": 1.0, "size": 40.0, "time": 0.0, "is_start": True}
+        step |= {"location": (0.0, 0.0, 0.0), "x_tilt": 0.0, "y_tilt": 0.0}
+        with in_view3d():
+            region = bpy.context.region
+            for number in range(20):
+                place = (region.width * (0.4 + 0.01 * number), region.height * 0.5)
+                start = time.perf_counter()
+                bpy.ops.paint.weight_paint(stroke=[step | {"mouse": place, "mouse_event": place}])
+                bpy.context.view_layer.update()
+                self.add(who, "paint", 1e3 * (time.perf_counter() - start))
+            bpy.ops.object.mode_set(mode="OBJECT")
+        yield 0.1
+
     def report(self) -> None:
         what = self.arguments.file.name if self.arguments.file else self.case.name
         facts = {"blender": bpy.app.version_string, "case": f"{what} {self.case.method}"}
         facts["vertices"] = sum(len(obj.data.vertices) for obj in self.meshes)
         facts = common.begin("window", **facts)
         print(f"{'':14}{'modifier':>10}{'sinew':>10}{'ratio':>10}")
-        for name, unit in (("play", "frames/s"), ("step", "ms"), ("draw", "ms"), ("pose", "ms")):
+        for name, unit in (
+            ("play", "frames/s"),
+            ("step", "ms"),
+            ("draw", "ms"),
+            ("pose", "ms"),
+            ("paint", "ms"),
+        ):
             modifier, sinew = (statistics.median(of[name]) for of in self.found.values())
             ratio = sinew / modifier if name == "play" else modifier / sinew
-            print(f"{name:5}{unit:9}{modifier:10.2f}{sinew:10.2f}{ratio:8.2f} x")
+            print(f"{name:6}{unit:8}{modifier:10.2f}{sinew:10.2f}{ratio:8.2f} x")
         print(f"late         {self.late['modifier']:11}{self.late['sinew']:10}")
         spreads = {who: {k: common.spread(v) for k, v in of.items()} for who, of in self.found.items()}
         common.write(self.arguments.name, machine=facts, late=self.late, found=spreads)

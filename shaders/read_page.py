@@ -33,7 +33,7 @@ def points(about, arrays, method, frame):
     """Points [vertices, 3] in armature space.
 
     about   the mesh's entry in the header
-    method  lbs, dq, cor, mix, or blender for the Armature modifier
+    method  one of the header's, or blender for the Armature modifier
     frame   its place in the header's frames
     """
     counts = np.diff(arrays["offsets"])
@@ -43,12 +43,14 @@ def points(about, arrays, method, frame):
     bones[slots], weights[slots] = arrays["bones"], arrays["weights"]
     still = weights.sum(axis=1) <= 1e-4
     weights[still, 0] = 1.0
-    by = Skinning(*(about["mix"] if method == "mix" else (method, method)), about["hierarchy"])
-    if method == "blender":
+    look = about["looks"][method]
+    is_mixed = look["mix"] and "shares" in arrays
+    by = Skinning(look["method"], look["mix"] if is_mixed else look["method"], look["by_hierarchy"])
+    if look["method"] == "blender":
         by = Skinning(about["blender"], about["blender"])
-    elif "amounts" in arrays:
-        (by.twist, by.bulge), by.form = arrays["amounts"].T, about["form"]
-    if method == "mix":
+    elif "masks" in arrays:
+        (by.twist, by.bulge), by.form = np.clip(arrays["masks"] * look["strengths"], 0, 1).T, look["form"]
+    if is_mixed:
         by.share = arrays["shares"].astype(np.float64)
     rest, palette = arrays["rest"].astype(np.float64), arrays["palettes"][frame]
     if "moving" in arrays:

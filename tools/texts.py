@@ -18,7 +18,7 @@ from sinew_addon.features.diagnose import mending
 from sinew_addon.features.gltf import players
 from sinew_addon.features.gltf.export_check import CAUSES, NAMED, NORMALS
 from sinew_addon.features.heat import heat_panel
-from sinew_addon.features.measure import battery, limits, metrics, suggestion
+from sinew_addon.features.measure import battery, joint_figures, limits, metrics, motion_range, suggestion
 from sinew_addon.features.suggest import recommendation
 from sinew_addon.skinning.engines import METHODS
 from sinew_addon.skinning.vertex_data import PROVIDERS
@@ -99,7 +99,8 @@ def _of_lists() -> Iterator[str]:
     yield from _of_each(metrics.METRICS.values(), "label", "text")
     yield from _of_each(suggestion.CRITERIA, "label", "text", "praise")
     yield from _of_each((*recommendation.METHODS, *recommendation.STAGES), "why")
-    yield from battery.FIGURE
+    yield from (*battery.FIGURE, *motion_range.RANGE, *motion_range.COLUMNS.values())
+    yield from joint_figures.Figures._fields
     yield from _of_each(mending.ALL.values(), "label", "description")
     yield from (*CAUSES.values(), *NAMED.values(), NORMALS)
     yield from (*players.PROPERTIES.values(), *(each.note for each in players.PLAYERS.values() if each.note))

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import argparse
+from collections.abc import Generator
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -16,8 +17,7 @@ from ..features.measure.diagnostics import USUAL_INFLUENCES
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
-from ..skinning.variants import SYNTAX, parse_list
-from . import contact_sheet
+from ..skinning.variants import SYNTAX, USUAL, parse_list
 from .arguments import (
     add_engine,
     add_files,
@@ -37,7 +37,7 @@ if TYPE_CHECKING:
     from ..features.measure.subjects import Subject
 
 
-SHEET = "blender, dq, cor, dq+twist_spread+bulge_limit, dq+twist_spread+delta_mush, recommended"
+SHEET = f"blender, {USUAL}, recommended"
 SUMMARY = "show and measure methods beside each other"
 HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
@@ -99,6 +99,11 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         help="write a contact sheet: the joints of the character bent in stated poses, a row for each "
         f"variant (default: {SHEET})",
     )
+    parser.add_argument(
+        "--difference",
+        action="store_true",
+        help="of a contact sheet: colour all rows after the first by how far each place is from the first",
+    )
     add_set(parser)
 
 
@@ -108,6 +113,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
     if args.sheet is not None:
         return _run_sheet(args, console)
+    if args.difference:
+        raise WrongUse("--difference colours a contact sheet: it goes with --sheet")
     named = USUAL_METHODS if args.methods is None else args.methods.split(",")
     methods = list(dict.fromkeys(name.strip() for name in named))
     characters.check_methods([*methods, args.reference], PRESETS)
@@ -125,7 +132,8 @@ def run(args: argparse.Namespace, console: Console) -> int:
         try:
             complete = True
             if args.viewer is not None:
-                complete = _write_viewer(path, methods, args, console)
+                write = _write_viewer if args.variants is None else _write_viewer_of_variants
+                complete = write(path, methods, args, console)
             if args.out is not None:
                 complete &= _compare(path, methods, engine, args, console)
         except SinewError as error:
@@ -142,7 +150,6 @@ def _run_sheet(args: argparse.Namespace, console: Console) -> int:
     if len(args.files) > 1:
         raise WrongUse(f"{args.sheet}: --sheet writes the sheet of a single file")
     _check_variants(args)
-    contact_sheet.require_pillow()
     try:
         return 0 if _write_sheet(args.files[0], args, console) else 1
     except SinewError as error:
@@ -155,7 +162,9 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
     import bpy
 
     from ..deform import characters
-    from ..features.pages import contact_sheet as drawn
+    from ..features.pages import contact_sheet, sheet_picture
+    from ..features.pages.pictures import write_picture
+    from ..features.pages.sheet import Sheet
     from ..io import files
 
     console.note_on(path, files.open_file(path))
@@ -167,12 +176,14 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
         console.complain(f"{path}: left out: {reason}")
     rows = [characters.with_presets(own[each]) for each in variants]
     console.note_on(path, characters.sentences())
-    joints = drawn.columns(meshes)
+    joints, size = contact_sheet.columns(meshes), args.size or 240
+    labels = [each.title for each in variants]
+    sheet = Sheet(path.stem, labels, contact_sheet.headings(joints), is_difference=args.difference)
     count = len(rows) * len(joints)
-    steps = drawn.cells(joints, rows, args.size or 240)
-    cells = list(console.progress(steps, count, f"Drawing {path.name}"))
-    columns = [(joint.joint, joint.pose.name) for joint in joints]
-    contact_sheet.write(args.sheet, path.stem, [each.title for each in variants], columns, cells)
+    for cell in console.progress(contact_sheet.cells(joints, rows, size), count, f"Drawing {path.name}"):
+        sheet.add(cell)
+    ticks = contact_sheet.ticks(bpy.context.scene, sheet.scale)
+    write_picture(args.sheet, sheet_picture.compose(sheet, size, ticks))
     console.say(str(args.sheet))
     return not left_out
 
@@ -183,7 +194,6 @@ def _check_variants(args: argparse.Namespace) -> None:
     others = {
         "--methods": args.methods is not None,
         "--set": bool(args.set),
-        "--viewer": args.viewer is not None,
     }
     for option in (option for option, is_given in others.items() if is_given):
         raise WrongUse(f"--variants names whole choices, which {option} does not take; leave one away")
@@ -224,12 +234,51 @@ def _write_viewer(path: Path, methods: list[str], args: argparse.Namespace, cons
     attached = viewer.attached_to(scene, meshes)
     of_each = dict.fromkeys(meshes, ())
     steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out)
-    with console.bar(f"Reading {path.name}", len(frames)) as show:
+    return _write_page(path, steps, len(frames), left_out, args.viewer, console)
+
+
+def _write_viewer_of_variants(
+    path: Path, _methods: list[str], args: argparse.Namespace, console: Console
+) -> bool:
+    """The same for variants, which have stages of their own."""
+    import bpy
+
+    from ..deform import characters
+    from ..features.pages import viewer
+    from ..io import files
+
+    console.note_on(path, files.open_file(path))
+    scene = bpy.context.scene
+    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
+    found = characters.deformed_meshes_of(scene, path, args.object)
+    own = {each: characters.own_variants(found, each) for each in args.variants}
+    meshes, left_out = characters.taken(found, path, [viewer.PLAYED])
+    rows = {
+        each.key: characters.with_presets({obj: variants[obj] for obj in meshes})
+        for each, variants in own.items()
+    }
+    console.note_on(path, characters.sentences())
+    attached = viewer.attached_to(scene, meshes)
+    of_each = dict.fromkeys(meshes, ())
+    steps = viewer.page(scene, path.stem, of_each, attached, list(rows), frames, left_out, variants=rows)
+    return _write_page(path, steps, len(frames), left_out, args.viewer, console)
+
+
+def _write_page(
+    path: Path,
+    steps: Generator[float, None, str],
+    count: int,
+    left_out: list[str],
+    target: Path,
+    console: Console,
+) -> bool:
+    """Returns False where a mesh was left out."""
+    with console.bar(f"Reading {path.name}", count) as show:
         text = result_of(steps, show)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
-    write_text(args.viewer, text)
-    console.say(str(args.viewer))
+    write_text(target, text)
+    console.say(str(target))
     return not left_out
 
 

@@ -100,6 +100,9 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         # While it is edited, what Sinew stores stays.
         is_off = attach.is_off(obj) and old.state is not State.EDITING
         if is_off or (wanted.state is State.REFUSED and is_same):
+            if is_given_up:
+                # It was saved while it was on, and Sinew has not deformed it since it was appended.
+                attach.restore_volume(obj)
             stack.position_own(obj, layout.read(obj))
             return
         attach.switch(obj, on=False)

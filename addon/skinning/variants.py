@@ -38,6 +38,9 @@ SETTINGS: Mapping[str, tuple[str, ...]] = {
 _STAGES = {stage.name: stage for stage in sinew.stages()}
 _GROUPS = {name for name, each in parameters.by_full_name().items() if each.kind == "vertex_group"}
 
+USUAL = "dq, cor, dq+twist_spread+bulge_limit, dq+twist_spread+delta_mush"
+"""What a character is compared under that has no variants of its own."""
+
 SYNTAX = (
     "METHOD[+STAGE]..., such as dq+twist_spread+delta_mush:iterations=10, and mix=METHOD for the mix; "
     "+scale_rule=RULE, +normals=WHO; blender, file or recommended alone; NAME= in front names it"
@@ -214,6 +217,11 @@ def parse(text: str) -> Variant:
 def parse_list(text: str) -> list[Variant]:
     """Reads variants that commas divide, each once. Raises WrongUse."""
     return list(dict.fromkeys(parse(each) for each in text.split(",")))
+
+
+def is_key(name: str) -> bool:
+    """Whether it is the key of a variant, and no method's name."""
+    return "=" in name
 
 
 def named(variant: Variant, name: str) -> Variant:

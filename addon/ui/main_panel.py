@@ -121,6 +121,7 @@ def _draw_character(
         row.operator("sinew.end_comparison")
     else:
         row.operator("sinew.compare", text="Compare\u2026")
+    row.operator("sinew.contact_sheet", text="", icon="IMGDISPLAY")
     if not stepped.draw_progress(row, "sinew.suggest"):
         row.operator("sinew.suggest", text="Suggest")
     if any(session.plan_of(obj).state is State.REFUSED for obj in meshes):

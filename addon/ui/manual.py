@@ -12,6 +12,7 @@ PAGE = Path(__file__).resolve().parent.parent / "manual.html"
 # Sections with the starts of names, in lower case as Blender looks them up; the first match counts.
 _OPERATORS = (
     ("presets", "method_preset"),
+    ("contact-sheet", "contact_sheet"),
     ("variants", "*variant"),
     ("method", "use_method", "*precomput"),
     ("meshes", "own_settings"),

@@ -146,6 +146,7 @@ class SINEW_MT_stages(_Submenu, bpy.types.Menu):
         Entry("sinew.make_group", "Make Vertex Group of Limit Bulge", values={"stage": "bulge_limit"}),
         Entry("sinew.make_group", "Make Vertex Group of Delta Mush", values={"stage": "delta_mush"}),
         Entry("sinew.add_variant"),
+        Entry("sinew.variant_keys"),
         Entry("sinew.method_preset_add", "Save Method as Preset\u2026"),
     )
 
@@ -155,6 +156,7 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
     bl_description = "Methods beside each other, and which one suits the character"
     entries = (
         Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
+        Entry("sinew.contact_sheet", icon="IMGDISPLAY"),
         Entry("sinew.flip_comparison"),
         Entry("sinew.save_comparison", "Save as Page\u2026", icon="URL"),
         Entry("sinew.end_comparison"),
@@ -245,6 +247,10 @@ def entries() -> Iterator[Entry]:
     yield from (*menu.first, *menu.then, *chain(*(each.entries for each in SUBMENUS)), *menu.last)
 
 
+# Of features/variants.
+VARIANTS_PIE = "SINEW_MT_variants_pie"
+
+
 class SINEW_MT_pie(bpy.types.Menu):
     bl_label = "Sinew"
     bl_description = "What one does most often while posing"
@@ -261,7 +267,8 @@ class SINEW_MT_pie(bpy.types.Menu):
         pie.operator("sinew.heat_map", icon="SHADING_RENDERED")
         pie.operator("sinew.check", icon="CHECKMARK")
         pie.operator("sinew.open_tab", icon="MENU_PANEL")
-        pie.operator("sinew.bake", text="Bake\u2026", icon="RENDER_ANIMATION")
+        # The variants' own pie, below features.
+        pie.operator("wm.call_menu_pie", text="Variants", icon="LINENUMBERS_ON").name = VARIANTS_PIE
 
 
 def _draw_in_menu(self: bpy.types.Menu, _context: bpy.types.Context) -> None:

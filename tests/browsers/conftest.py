@@ -78,6 +78,16 @@ def bent(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def varied(tmp_path_factory):
+    """A page of variants that differ in stages, by their keys."""
+    page = tmp_path_factory.mktemp("variants") / "wrist.html"
+    keys = "=blender", "Soft=dq+twist_spread:amount=0.8", "=dq:signs=hierarchy+bulge_limit", "=lbs"
+    source = REPOSITORY / "blend_files/wrist.blend"
+    sinew("compare", source, "--variants", ",".join(keys), "--frames", "1,12,24", "--viewer", page)
+    return page, keys
+
+
+@pytest.fixture(scope="session")
 def made(tmp_path_factory):
     """By name: files whose meshes are in armature space, so that it is the space of `sinew points`."""
     folder, files = tmp_path_factory.mktemp("pages"), REPOSITORY / "blend_files"

@@ -6,6 +6,7 @@ are found.
 SINEW_PICTURES  a folder for pictures, to look at
 """
 
+import itertools
 import os
 from pathlib import Path
 
@@ -36,6 +37,17 @@ const [mark, view] = boxes.map((box) => [box.x + box.width / 2, box.y + box.heig
 return [mark[0] - view[0], mark[1] - view[1]]
 """
 IS_MARKED = f"(() => {{{MARKED}}})().every((x) => Math.abs(x) < 2)"
+# Drags the handle of the wipe to a quarter of the width.
+DRAG = """
+const handle = document.getElementById("wipe");
+const { left, width } = document.getElementById("stage").getBoundingClientRect();
+handle.hasPointerCapture = () => true;
+handle.setPointerCapture = () => {};
+for (const [name, share] of [["pointerdown", 0.52], ["pointermove", 0.25], ["pointerup", 0.25]]) {
+  const at = { clientX: left + share * width, pointerId: 1, bubbles: true };
+  handle.dispatchEvent(new PointerEvent(name, at));
+}
+"""
 DRAWS = "document.getElementById('notes').lastChild.textContent"
 VIEW = "const { yaw, pitch, zoom, offset } = window.sinew.state; return [yaw, pitch, zoom, ...offset]"
 
@@ -153,6 +165,58 @@ def test_keys_and_controls(browser, made):
     assert after[0] != yaw
     assert after[1] > zoom
     assert browser.run("return window.sinew.way.error()") == 0
+
+
+def test_variants_have_stages_of_their_own(browser, varied):
+    """As the page's data has them, which tests with Blender compare."""
+    page, keys = varied
+    browser.show(page)
+    header, meshes = read_page.read(page)
+    assert tuple(header["methods"]) == keys
+    shapes = []
+    for key in keys:
+        expected = read_page.points(header["parts"][0], meshes[0], key, 2)
+        found = points(browser, 0, f"'{key}'", 2)
+        assert np.abs(found - expected).max() <= 1e-5 * np.linalg.norm(np.ptp(expected, axis=0)), key
+        shapes.append(found)
+    assert all(np.abs(a - b).max() > 1e-3 for a, b in itertools.combinations(shapes[:3], 2))
+    assert browser.run("return document.getElementById('stages-set').hidden")
+    labels = "return [...document.getElementById('method-0').options].map((one) => one.textContent)"
+    assert browser.run(labels)[1:3] == [
+        "Soft: Dual Quaternion with Twist Spread",
+        "Dual Quaternion with Limit Bulge",
+    ]
+
+
+def test_a_wipe_shows_two_over_each_other(browser, varied):
+    """What is left of its handle is the first, what is right of it the second, with one camera."""
+    page, keys = varied
+    browser.show(page)
+    browser.run(f"window.sinew.set({{ frame: 2, panes: 1, methods: {list(keys[:2])} }})")
+    assert browser.run("return document.getElementById('wipe').hidden")
+    wholes = []
+    for methods in (keys[:2], keys[1::-1]):
+        browser.run(f"window.sinew.set({{ methods: {list(methods)} }})")
+        wholes.append(pixels(browser))
+    browser.run(f"window.sinew.set({{ methods: {list(keys[:2])} }})")
+    browser.press("w")
+    middle = wholes[0].shape[1] // 2
+    assert np.abs(wholes[0] - wholes[1])[:, middle - 150 : middle].max() > 50
+    for share in (0.5, 0.3, 1.0, 0.0):
+        browser.run(f"window.sinew.set({{ wipe: {share} }})")
+        cut, found = round(share * wholes[0].shape[1]), pixels(browser)
+        np.testing.assert_array_equal(found[:, :cut], wholes[0][:, :cut])
+        np.testing.assert_array_equal(found[:, cut:], wholes[1][:, cut:])
+    handle = "document.getElementById('wipe')"
+    browser.run(f"window.sinew.set({{ wipe: 0.5 }}); {handle}.focus()")
+    browser.press("\ue014")
+    assert browser.run("return window.sinew.state.wipe") == pytest.approx(0.52)
+    assert browser.run(f"return {handle}.getAttribute('aria-valuenow')") == "52"
+    browser.run(DRAG)
+    assert browser.run("return window.sinew.state.wipe") == pytest.approx(0.25, abs=0.01)
+    browser.press("w")
+    assert browser.run(f"return {handle}.hidden")
+    assert browser.run("return [window.sinew.state.panes, window.sinew.state.wipe]") == [2, None]
 
 
 def test_stages_are_switched(browser, made):

@@ -273,6 +273,8 @@ class _Rig:
             if obj.data.users > 1:
                 bake_state.use_copy_of_mesh(obj)
             helper_bones_io.write_weights(obj, self._bones, movers, slots[rows], weights[rows])
+            # These weights have the envelopes in them.
+            stack.armature_modifier(obj).use_bone_envelopes = False
         return [self._segments.report(self.rig.name, self._unit)]
 
 

@@ -29,7 +29,7 @@ from ...deform import characters, session
 from ...io import actions
 from ...io.actions import players
 from ...skinning.stages import ORDER
-from ...skinning.variants import parse
+from ...skinning.variants import is_key, parse
 from ...skinning.vectors import transformed
 from ...ui.translations import tr
 from . import comparison_state, offset_nodes
@@ -233,7 +233,7 @@ def _colour(method: str, number: int) -> tuple[float, float, float]:
 
 def _copy(obj: bpy.types.Object, method: str, colour: tuple[float, float, float]) -> bpy.types.Object:
     """Returns a copy, deformed by `method` if an armature deforms it, in no collection yet."""
-    variant = parse(method) if comparison_state.is_variant(method) else None
+    variant = parse(method) if is_key(method) else None
     label = variant.title if variant is not None else properties.method_label(method)
     copy = upstream_proxy.copy_that_follows(obj, f"{obj.name} {label}")
     original = properties.of(obj) if properties.has_sinew(obj) else None

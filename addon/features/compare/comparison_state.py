@@ -7,7 +7,7 @@ import bpy
 
 from ...attach import properties
 from ...deform import characters
-from ...skinning.variants import parse
+from ...skinning.variants import is_key, parse
 from ...ui.translations import tr
 from . import offset_nodes
 
@@ -25,7 +25,7 @@ def _changed(state: SinewComparison, _context: bpy.types.Context) -> None:
 def _compared_methods(state: SinewComparison, _context: bpy.types.Context) -> list[tuple]:
     choices: dict[str, tuple] = {item[0]: item for item in properties.method_choices()}
     keys = methods_of(state)
-    variants = [key for key in keys if is_variant(key)]
+    variants = [key for key in keys if is_key(key)]
     # Blender does not keep the texts of computed items.
     for number, key in enumerate(variants, start=FIRST_VARIANT):
         _items[key, number] = (key, *(2 * (label_of(key),)), "NONE", number)
@@ -98,17 +98,12 @@ def copies_of(state: SinewComparison) -> list[bpy.types.Object]:
 def methods_of(state: SinewComparison) -> list[str]:
     """Returns the methods that have copies, in the table's order; then keys of variants, in theirs."""
     there = dict.fromkeys(properties.of(obj).identity.method for obj in copies_of(state))
-    return [name for name in characters.method_names() if name in there] + list(filter(is_variant, there))
-
-
-def is_variant(name: str) -> bool:
-    """Whether it is the key of a variant, and no method's name."""
-    return "=" in name
+    return [name for name in characters.method_names() if name in there] + list(filter(is_key, there))
 
 
 def label_of(name: str) -> str:
     """name: of a method, or the key of a variant"""
-    return tr(parse(name).title) if is_variant(name) else tr(properties.method_label(name))
+    return tr(parse(name).title) if is_key(name) else tr(properties.method_label(name))
 
 
 def arrange(state: SinewComparison) -> None:

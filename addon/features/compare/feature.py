@@ -13,7 +13,7 @@ from ...attach.subscribers import subscribers
 from ...attach.updates import may_change_file, updates_suspended
 from ...base.errors import SinewError
 from ...deform import characters
-from ...skinning.variants import parse_list
+from ...skinning.variants import is_key, parse_list
 from ...ui import operators, stepped
 from ...ui.sidebar import Sidebar, draw_text
 from ..pages import viewer
@@ -101,7 +101,7 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
         state = comparison_state.of_scene(context.scene)
         compared = comparison_state.methods_of(state) if state is not None else []
         if compared:
-            self.methods = {name for name in compared if not comparison_state.is_variant(name)}
+            self.methods = {name for name in compared if not is_key(name)}
         else:
             shown = {comparison.method_shown(obj) for obj in attach.deformed_meshes(character(context))}
             if len(shown) == 1:
@@ -123,8 +123,8 @@ class SINEW_OT_compare(operators.Acting, bpy.types.Operator):
     def run(self, context: bpy.types.Context) -> None:
         if self.choices:
             chosen = [choice.name for choice in self.choices if choice.is_shown]
-            self.methods = {name for name in chosen if not comparison_state.is_variant(name)}
-            self.variants = ",".join(filter(comparison_state.is_variant, chosen))
+            self.methods = {name for name in chosen if not is_key(name)}
+            self.variants = ",".join(filter(is_key, chosen))
         methods = [name for name in characters.method_names() if name in self.methods]
         for variant in parse_list(self.variants) if self.variants.strip() else ():
             if variant.method not in properties.METHODS:
@@ -222,10 +222,7 @@ class SINEW_OT_save_comparison(SavesPage, bpy.types.Operator):
         attached = [obj for obj in meshes if obj not in of_each]
         armatures = list(dict.fromkeys(attach.armature_of(obj) for obj in of_each))
         frames = stepped.frames_over(scene, armatures, self.over)
-        compared = comparison_state.methods_of(state)
-        methods = [name for name in compared if not comparison_state.is_variant(name)]
-        if not methods:
-            raise SinewError("The page shows methods with the stages of the character: compare one, too")
+        methods = comparison_state.methods_of(state)
         with stepped.kept_frame(scene, armatures):
             return (yield from viewer.page(scene, title, of_each, attached, methods, frames))
 

@@ -9,12 +9,13 @@ import bpy
 import numpy as np
 from mathutils import Matrix
 
-from ...attach import properties
+from ...attach import properties, variant_settings
 from ...attach.feature import Feature
 from ...attach.layout import read as read_stack
 from ...attach.subscribers import subscribers
 from ...base.errors import SinewError
-from ...ui import operators, stepped
+from ...skinning.variants import Variant, parse
+from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects, sinew_targets
 from ...ui.sidebar import Sidebar, draw_text, names_text
 from ...ui.translations import tr
@@ -23,11 +24,10 @@ from ..measure import diagnostics
 from ..measure.limits import Table
 from ..measure.worst_frames import check_measurable
 from ..pages.save import SavesPage
+from ..variants import choices
 from . import flex, page
 from .verdict import Finding, Joint
 
-# What is tried beside a character's own method.
-OTHERS = ("lbs", "dq", "cor")
 FAULTS_SHOWN = 8
 
 # By the session_uid of the scene. Nothing is stored in files.
@@ -43,17 +43,17 @@ class SINEW_OT_flex(OnSinewObjects, stepped.Stepped, bpy.types.Operator):
     saying = "Sinew bends every joint"
 
     others: bpy.props.BoolProperty(
-        name="Try Methods",
-        description="Also try linear blending, dual quaternions and centres of rotation, and say which "
-        "mend a joint",
+        name="Try Variants",
+        description="Also try the other variants of the character, and say which mend a joint",
         options={"SKIP_SAVE"},
     )
 
     def steps(self, context: bpy.types.Context) -> Iterator[float]:
         objects = sinew_targets(context)
         check_measurable(objects)
-        shown = {properties.of(obj).method for obj in objects}
-        others = [name for name in OTHERS if self.others and {name} != shown]
+        shown = [variant_settings.read(obj) for obj in objects]
+        tried = choices.of_character(context) if self.others else ()
+        others = [each.key for each in tried if not all(map(each.agrees_with, shown))]
         self.result = yield from flex.flex(objects, others, Table(), {})
 
     def run(self, context: bpy.types.Context) -> None:
@@ -169,7 +169,7 @@ class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
         row = layout.row(align=True)
         if not stepped.draw_progress(row, "sinew.flex"):
             row.operator("sinew.flex", text="Bend Every Joint", icon="CON_ROTLIMIT")
-            row.operator("sinew.flex", text="Try Methods").others = True
+            row.operator("sinew.flex", text="Try Variants").others = True
         result = results.get(context.scene.session_uid)
         if result is None:
             return
@@ -185,10 +185,12 @@ class SINEW_PT_flex(Sidebar, operators.OfSkinned, bpy.types.Panel):
             for number, joint in enumerate(result.verdict.joints)
             for place, finding in enumerate(joint.findings)
         }
+        lead = character.lead(context)
+        now = variant_settings.read(lead) if lead is not None else None
         faults, told = result.verdict.by_cause(), set()
         shown = len(faults) if context.scene.sinew_all_faults else FAULTS_SHOWN
         for own, others in faults[:shown]:
-            _draw_fault(layout.box().column(), context, places, own, others, told)
+            _draw_fault(layout.box().column(), context, places, own, others, told, now)
         if len(faults) > FAULTS_SHOWN:
             text = tr("Show All {count}", count=len(faults))
             layout.prop(context.scene, "sinew_all_faults", text=text, translate=False, toggle=True)
@@ -208,18 +210,22 @@ def _draw_fault(
     own: Finding,
     others: Sequence[Finding],
     told: set[str],
+    now: Variant | None,
 ) -> None:
     """
     places  of findings in the list, by their id
     others  those that come from it
     told    names of limits whose advice is above
+    now     what deforms the character
     """
     limit, key = own.limit, f"{own.limit.name} {own.joint}"
     layout.label(text=own.joint, icon="BONE_DATA", translate=False)
     _draw_place(layout, places[id(own)], own)
     if own.mends:
-        names = ", ".join(tr(properties.METHODS[name].label) for name in own.mends)
-        draw_text(layout, "Not under {methods}", icon="SOLO_ON", methods=names)
+        layout.label(text="Not under", icon="SOLO_ON")
+        column = layout.column(align=True)
+        for text in own.mends:
+            choices.draw_use(column, parse(text), now)
     elif limit.name not in told:
         told.add(limit.name)
         draw_text(layout, tr(limit.meaning))

@@ -14,6 +14,7 @@ import numpy as np
 from ...attach import properties
 from ...base.errors import SinewError
 from ...skinning.rig import Bones
+from ...skinning.variants import is_key, parse
 from ..measure import battery, live
 from ..measure.character import Character
 from ..measure.crossings import crossing_triangles
@@ -53,6 +54,8 @@ class _Posed:
         return self.moment.pose.frame
 
     def points(self, method: str) -> np.ndarray:
+        if is_key(method):
+            return self.moment.points_under([parse(method)] * len(self.own))
         return self.moment.points(self.own if method == OWN else [method] * len(self.own))
 
 
@@ -65,7 +68,7 @@ def flex(
     """Yields the progress; returns the verdict on the objects' own methods.
 
     objects  those that Sinew deforms
-    methods  others to try
+    methods  others to try, or keys of variants
     own      as of live.Moment.points(), for objects that are to be judged otherwise than they are shown
 
     Raises SinewError where there is nothing to bend.

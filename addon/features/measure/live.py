@@ -287,9 +287,13 @@ class Moment:
 
     def measured_under(self, variants: Sequence[Variant]) -> Measured:
         """Measures the shape under a variant of each part."""
-        pairs = zip(self.inputs, variants, strict=True)
-        points = _shape_of([own.under_variant(variant) for own, variant in pairs], self.worlds)
+        points = self.points_under(variants)
         return Measured(self.pose, Shape(self.subject.gauge.surface, points), None)
+
+    def points_under(self, variants: Sequence[Variant]) -> np.ndarray:
+        """As points(), under a variant of each part."""
+        pairs = zip(self.inputs, variants, strict=True)
+        return _shape_of([own.under_variant(variant) for own, variant in pairs], self.worlds)
 
 
 def _twists(part: Part, depsgraph: bpy.types.Depsgraph) -> TwistInputs:

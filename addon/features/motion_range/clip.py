@@ -86,21 +86,41 @@ def start(
     if not poses:
         raise SinewError(f"{armature.name}: none of its bones bends anything")
     channels = _channels(armature, bones, poses)
-    state = _state(scene, armature)
-    own = armature.animation_data.action if armature.animation_data is not None else None
-    record = armature.sinew_motion_range
-    record.is_on, record.action, record.scene, record.state = True, own, scene, json.dumps(state)
-    _switch_off(armature)
+    _hold(scene, armature)
     pose_io.write_channels(armature.pose.bones, channels[0].astype(np.float32))
-    made = record.made = bpy.data.actions.new(f"{armature.name} {NAME}")
+    made = armature.sinew_motion_range.made = bpy.data.actions.new(f"{armature.name} {NAME}")
     named = _key(armature, made, channels, [pose.name for pose in poses])
     scene.use_preview_range = True
     scene.frame_preview_start, scene.frame_preview_end = FIRST, FIRST + 2 * STEP * len(poses)
     return named
 
 
+def show(scene: bpy.types.Scene, armature: bpy.types.Object, bones: Bones, pose: battery.Pose) -> None:
+    """Has an armature be in one pose: until restore(), or until the next frame where it plays one already.
+
+    bones  of the armature
+
+    Raises SinewError where it can not.
+    """
+    check(armature)
+    channels = _channels(armature, bones, [pose])
+    if not is_on(armature):
+        _hold(scene, armature)
+        armature.animation_data.action = None
+    pose_io.write_channels(armature.pose.bones, channels[1].astype(np.float32))
+    armature.update_tag()
+
+
+def _hold(scene: bpy.types.Scene, armature: bpy.types.Object) -> None:
+    """Leaves nothing that moves bones but an action, and keeps what restore() needs."""
+    own = armature.animation_data.action if armature.animation_data is not None else None
+    record, state = armature.sinew_motion_range, _state(scene, armature)
+    record.is_on, record.action, record.scene, record.state = True, own, scene, json.dumps(state)
+    _switch_off(armature)
+
+
 def restore(armature: bpy.types.Object, keep: bool = False) -> None:
-    """Puts back what start() replaced.
+    """Puts back what start() or show() replaced.
 
     keep  its action stays in the file
     """

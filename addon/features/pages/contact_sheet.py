@@ -7,7 +7,6 @@ Shapes are computed and drawn beside Blender's evaluation: the file, its pose an
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from functools import cached_property
 
 import bpy
@@ -16,13 +15,16 @@ import sinew
 
 from ...attach import properties
 from ...base.errors import SinewError
+from ...io import units
 from ...skinning.variants import Variant
 from ...skinning.vectors import unit
 from ..measure import live, motion_range
+from ..measure.heat_scale import HeatScale
 from ..measure.joint_figures import Figures
 from ..measure.motion_range import Column
 from ..measure.rigs import Rig, posed, rigs_of
 from . import shaded
+from .sheet import Cell
 from .views import View, joint_view
 
 # How far around a joint a picture shows, in mean lengths of the two limbs that meet there.
@@ -31,27 +33,20 @@ REACH = 1.0
 LEAST_BENT = 2e-4
 
 
-@dataclass(frozen=True)
-class Cell:
-    """pixels: float32 [size, size, 4], RGBA in 0..1, from the bottom row up"""
-
-    row: int
-    column: int
-    pixels: np.ndarray
-    figures: Figures
-
-
 # Joints of limbs, which are seen without the rest of the body.
 OF_LIMBS = ("Elbow", "Wrist", "Knee", "Fingers")
 
 
 class Bent:
-    """One column: a joint of the character in its pose."""
+    """One column: a joint of the character in its pose.
 
-    def __init__(self, now: live.Moment, rig: Rig, column: Column) -> None:
+    rigs  of the character, which are at rest but for `rig`
+    """
+
+    def __init__(self, now: live.Moment, rigs: Sequence[Rig], rig: Rig, column: Column) -> None:
         self.joint, self.pose = column.joint, column.pose
         self.moment = posed(now, {rig.bones.names: column.pose})
-        self._rig, self._bones = rig, column.bones
+        self.rigs, self.rig, self._bones = rigs, rig, column.bones
 
     @property
     def bent_share(self) -> float:
@@ -62,11 +57,11 @@ class Bent:
     def view(self) -> View:
         """A view for all variants."""
         points = self.moment.measured_under([Variant.of("lbs")] * len(self.moment.inputs)).shape.points.T
-        bone, world = self._bones[0], self._rig.world[:3, :3]
+        bone, world = self._bones[0], self.rig.world[:3, :3]
         motion = np.identity(4)
         motion[:3, :3] = self.pose.rotations[bone]
         axis = sinew.affine.to_screw(motion).axis
-        axis, limb = (unit(world @ each) for each in (axis, self._rig.bones.limbs.vectors[bone]))
+        axis, limb = (unit(world @ each) for each in (axis, self.rig.bones.limbs.vectors[bone]))
         return joint_view(points, points[self._is_near()], axis, limb)
 
     @cached_property
@@ -74,7 +69,7 @@ class Bent:
         """bool [triangles], those that are drawn; None: all."""
         if self.joint not in OF_LIMBS:
             return None
-        bones = self._rig.bones.deforming_parents
+        bones = self.rig.bones.deforming_parents
         taken = {int(bones[bone]) for bone in self._bones}.union(*map(self._carried, self._bones))
         return self._follow(taken)[self.moment.subject.gauge.surface.triangles].any(axis=1)
 
@@ -85,8 +80,8 @@ class Bent:
 
     def _is_near(self) -> np.ndarray:
         """bool [vertices]: those around the joints, of the limbs that meet there."""
-        bones, near = self._rig.bones, np.zeros(self.moment.subject.gauge.surface.vertex_count, bool)
-        rest, linear, place = self.moment.pose.rest.points, self._rig.world[:3, :3], self._rig.world[:3, 3]
+        bones, near = self.rig.bones, np.zeros(self.moment.subject.gauge.surface.vertex_count, bool)
+        rest, linear, place = self.moment.pose.rest.points, self.rig.world[:3, :3], self.rig.world[:3, 3]
         for bone in self._bones:
             head, above = bones.rest[bone, :3, 3], int(bones.deforming_parents[bone])
             ways = np.stack([bones.limbs.vectors[bone], head - bones.rest[above, :3, 3]])
@@ -105,7 +100,7 @@ class Bent:
 
     def _around(self, bone: int) -> set[int]:
         """The bone, what carries it, and what it carries directly."""
-        above = self._rig.bones.deforming_parents
+        above = self.rig.bones.deforming_parents
         return {bone, int(above[bone]), *map(int, np.flatnonzero(above == bone))}
 
     def _follow(self, bones: set[int]) -> np.ndarray:
@@ -118,14 +113,14 @@ class Bent:
         found = []
         for own in self.moment.inputs:
             of_part = own.part.bound.first_deformer.bones
-            is_own = of_part.names == self._rig.bones.names
+            is_own = of_part.names == self.rig.bones.names
             found.append(np.isin(of_part.owners, list(bones)) & is_own)
         return np.concatenate(found)
 
     def _carried(self, bone: int) -> set[int]:
         found = {bone}
-        for other in self._rig.bones.from_the_root:
-            if int(self._rig.bones.deforming_parents[other]) in found:
+        for other in self.rig.bones.from_the_root:
+            if int(self.rig.bones.deforming_parents[other]) in found:
                 found.add(other)
         return found
 
@@ -137,8 +132,9 @@ def columns(objects: Sequence[bpy.types.Object]) -> list[Bent]:
     """
     now = live.Moment.of(live.measure_now(objects, properties.BLENDER, "bend"))
     found: list[Bent] = []
-    for rig in rigs_of(now):
-        own = [Bent(now, rig, column) for column in motion_range.columns(rig.bones, rig.is_moving)]
+    rigs = rigs_of(now)
+    for rig in rigs:
+        own = [Bent(now, rigs, rig, column) for column in motion_range.columns(rig.bones, rig.is_moving)]
         own = [each for each in own if each.bent_share >= LEAST_BENT]
         if not all(each.joint in motion_range.COLUMNS.values() for each in own):
             most = sorted(own, key=lambda each: -each.bent_share)[: motion_range.MOST_OTHERS]
@@ -149,6 +145,17 @@ def columns(objects: Sequence[bpy.types.Object]) -> list[Bent]:
     return found
 
 
+def headings(joints: Sequence[Bent]) -> list[tuple[str, str]]:
+    """As Sheet.columns has them."""
+    return [(joint.joint, joint.pose.name) for joint in joints]
+
+
+def ticks(scene: bpy.types.Scene, scale: HeatScale) -> tuple[str, str]:
+    """The least and the most of a sheet's colours, with units."""
+    least, most = (units.text(scene, scale.metric.unit, value, short=True) for value in scale.ticks(2))
+    return least, f"\u2265 {most}" if scale.clipped else most
+
+
 def cells(
     joints: Sequence[Bent], rows: Sequence[Mapping[bpy.types.Object, Variant]], size: int
 ) -> Iterator[Cell]:
@@ -157,13 +164,16 @@ def cells(
     rows  by object, the variant that it has
     size  pixels of a picture
     """
+    first: list[np.ndarray] = []
     for row, of_objects in enumerate(rows):
         for column, bent in enumerate(joints):
             variants = [of_objects[own.part.obj] for own in bent.moment.inputs]
             measured = bent.moment.measured_under(variants)
-            figures = Figures.of(measured, bent.limbs)
-            if np.isfinite(measured.shape.points).all():
-                pixels = shaded.draw(measured.shape, bent.view, size, bent.shown)
-            else:
-                pixels = np.zeros((size, size, 4), np.float32)
-            yield Cell(row, column, pixels, figures)
+            points = measured.shape.points
+            if row == 0:
+                first.append(points)
+            picture = shaded.empty(size)
+            if np.isfinite(points).all():
+                distances = np.linalg.norm(points - first[column], axis=0)
+                picture = shaded.picture(measured.shape, bent.view, size, bent.shown, distances)
+            yield Cell(row, column, picture, Figures.of(measured, bent.limbs), bent.view.width)

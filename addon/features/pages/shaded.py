@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 import numpy as np
 
 from ...skinning.influences import items_of, owners_of
@@ -16,16 +19,58 @@ SAMPLES = 2
 EDGE = 1e-4
 # Over how many samples to each side normals are compared, and how much that lightens.
 WIDTH, CAVITY = 2, 0.5
+# How bright the darkest place is in a picture that is coloured by values.
+DARKEST = 0.6
 # sRGB; light comes from the upper left, behind the camera.
 FRONT, BACK = np.array([0.80, 0.76, 0.71], np.float32), np.array([0.55, 0.30, 0.24], np.float32)
 _LIGHT = (np.array([-0.45, 0.55, 0.70]) / np.linalg.norm([-0.45, 0.55, 0.70])).astype(np.float32)
 
 
-def draw(shape: Shape, view: View, size: int, shown: np.ndarray | None = None) -> np.ndarray:
-    """Returns float32 [size, size, 4], RGBA in 0..1, from the bottom row up; transparent where nothing is.
+@dataclass(frozen=True)
+class Picture:
+    """
+    pixels  float32 [size, size, 4], RGBA in 0..1, from the bottom row up; transparent where nothing is
+    light   float32 [size, size], how bright the surface is
+    values  float32 [size, size], the mean of the vertices' values there, 0 where nothing is; empty without
+            values
+    """
 
-    view   square
-    shown  bool [triangles]; None: all
+    pixels: np.ndarray
+    light: np.ndarray
+    values: np.ndarray
+
+    def coloured(self, colours: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
+        """Returns `pixels` in the colours of the values.
+
+        colours  of values [n], sRGB [n, 3] in 0..1
+        """
+        found = self.pixels.copy()
+        shade = DARKEST + (1.0 - DARKEST) * self.light.clip(0.0, 1.0)
+        found[..., :3] = colours(self.values.ravel()).reshape(*self.values.shape, 3) * shade[..., None]
+        return found
+
+
+def empty(size: int) -> Picture:
+    light = np.zeros((size, size), np.float32)
+    return Picture(np.zeros((size, size, 4), np.float32), light, light)
+
+
+def draw(shape: Shape, view: View, size: int, shown: np.ndarray | None = None) -> np.ndarray:
+    """As picture(); its pixels alone."""
+    return picture(shape, view, size, shown).pixels
+
+
+def picture(
+    shape: Shape,
+    view: View,
+    size: int,
+    shown: np.ndarray | None = None,
+    values: np.ndarray | None = None,
+) -> Picture:
+    """
+    view    square
+    shown   bool [triangles]; None: all
+    values  [vertices], to be coloured by
     """
     across = size * SAMPLES
     right, up = camera_axes(view.direction)
@@ -34,7 +79,7 @@ def draw(shape: Shape, view: View, size: int, shown: np.ndarray | None = None) -
     # In samples, with their middles at whole numbers.
     seen[:2] = (seen[:2] / view.width + 0.5) * across - 0.5
     corners = _corners_in(seen[:2], shape, across, shown)
-    samples, triangles, shares = _nearest(seen, corners, across)
+    samples, triangles, shares = nearest(seen, corners, across)
     lit = axes @ _vertex_normals(shape)
     lit = (lit / np.maximum(np.sqrt(dots(lit, lit)), 1e-12)).astype(np.float32)
     normals = np.einsum("kcn,cn->kn", lit[:, corners[:, triangles]], shares)
@@ -44,12 +89,27 @@ def draw(shape: Shape, view: View, size: int, shown: np.ndarray | None = None) -
     faces = np.where(outwards[triangles], np.float32(1.0), np.float32(-1.0))
     light = 0.35 + 0.65 * np.clip((_LIGHT @ normals) * faces, 0.0, 1.0)
     light *= 1.0 + _cavity(normals * faces, samples, across)
-    picture = np.zeros((across * across, 4), np.float32)
-    picture[samples, :3] = light[:, None] * np.where(faces[:, None] > 0.0, FRONT, BACK)
-    picture[samples, 3] = 1.0
-    blocks = picture.reshape(size, SAMPLES, size, SAMPLES, 4).sum(axis=(1, 3))
-    colours = blocks[..., :3] / np.maximum(blocks[..., 3:], 1.0)
-    return np.concatenate([colours, blocks[..., 3:] / SAMPLES**2], axis=2).clip(0.0, 1.0)
+    shown_values = np.empty((0, 0), np.float32)
+    colours = light[:, None] * np.where(faces[:, None] > 0.0, FRONT, BACK)
+    cover = _shrunk(np.ones(len(samples), np.float32), samples, size)
+    whole = np.maximum(cover, 1e-6)
+    means = np.stack([_shrunk(channel, samples, size) for channel in (*colours.T, light)], axis=-1)
+    means /= whole[..., None]
+    if values is not None:
+        of_samples = (values.astype(np.float32)[corners[:, triangles]] * shares).sum(axis=0)
+        shown_values = _shrunk(of_samples, samples, size) / whole
+    pixels = np.concatenate([means[..., :3], cover[..., None]], axis=2).clip(0.0, 1.0)
+    return Picture(pixels, means[..., 3], shown_values)
+
+
+def _shrunk(values: np.ndarray, samples: np.ndarray, size: int) -> np.ndarray:
+    """float32 [size, size]: of each pixel the sum over its covered samples, as a share of all.
+
+    values  [n], of the samples
+    """
+    whole = np.zeros((size * SAMPLES) ** 2, np.float32)
+    whole[samples] = values
+    return whole.reshape(size, SAMPLES, size, SAMPLES).mean(axis=(1, 3))
 
 
 def _vertex_normals(shape: Shape) -> np.ndarray:
@@ -64,11 +124,16 @@ def _corners_in(places: np.ndarray, shape: Shape, across: int, shown: np.ndarray
     points = places[:, corners]
     low, high = points.min(axis=1), points.max(axis=1)
     is_in = ((high >= 0.0) & (low <= across - 1)).all(axis=0)
+    return corners[:, is_in & are_wide(points)]
+
+
+def are_wide(points: np.ndarray) -> np.ndarray:
+    """bool [n]: triangles [2, 3, n] that are no lines."""
     (ax, bx, cx), (ay, by, cy) = points
-    return corners[:, is_in & (np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) > 1e-9)]
+    return np.abs((bx - ax) * (cy - ay) - (cx - ax) * (by - ay)) > 1e-9
 
 
-def _nearest(seen: np.ndarray, corners: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def nearest(seen: np.ndarray, corners: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Returns the samples that are covered, and of each the nearest triangle with the shares of its corners
     [3, n].
 

@@ -4,8 +4,9 @@
 Meshes are those of Sinew's objects: of the mesh itself or, where Sinew is off there, of a copy of it.
 """
 
-from collections.abc import Generator, Mapping, Sequence
+from collections.abc import Generator, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from types import MappingProxyType
 
 import bpy
 import numpy as np
@@ -22,14 +23,20 @@ from ...skinning.influences import Influences
 from ...skinning.rig import Bones
 from ...skinning.scale_rule import BLENDER_4
 from ...skinning.twist_spread import NOT_TOLD, TwistInputs
+from ...skinning.variants import Variant, is_key, parse
 from ...skinning.vectors import transformed
 from ...skinning.vertex_data import VertexData
 from ..measure import battery
-from .viewer_page import BLENDER, METHODS, MIX, Found, Part, Stages, Viewer
+from .viewer_page import BLENDER, METHODS, MIX, Form, Found, Look, Part, Stages, Viewer
 
 # The method of meshes that have none of their own; any of Sinew's would do.
 PLAYED = "dq"
 POSES_A_SECOND = 1.0
+# The stages that the shaders have, each with the parameter of its strength.
+STRENGTHS = {"twist_spread": "amount", "bulge_limit": "strength"}
+
+Variants = Mapping[str, Mapping[bpy.types.Object, Variant]]
+"""By keys of variants, what each is for objects for which it is not what the key says."""
 NOTES = (
     "The browser skins the meshes by the shaders that Sinew has for engines: Linear Blend, Dual Quaternion, "
     "Centres of Rotation and the painted mix of two, Twist Spread and Limit Bulge. For other methods and for "
@@ -158,19 +165,28 @@ def page(
     frames: Sequence[float] | Sequence[Pose],
     left_out: Sequence[str] = (),
     found: Found | None = None,
+    variants: Variants = MappingProxyType({}),
 ) -> Generator[float, None, str]:
     """Yields the progress, returns the text of the page. Sets frames; restoring is the caller's.
 
     meshes    each with the objects that Sinew may deform in its place
     attached  meshes that bones move as they are
-    methods   those to choose from; the shaders lack some, which the page says
+    methods   those to choose from, or keys of variants; the shaders lack some, which the page says
     frames    of the scene, or poses beside the one that it has
     left_out  sentences on other meshes
     found     what Flex found in these poses
 
     Raises SinewError where no mesh or method can be shown.
     """
-    shown = [name for name in methods if name in (*METHODS, BLENDER)]
+    own: dict[bpy.types.Object, dict[str, Variant]] = {
+        obj: {name: variants.get(name, {}).get(obj) or parse(name) for name in filter(is_key, methods)}
+        for obj in meshes
+    }
+    shown = [
+        name
+        for name in methods
+        if name in (*METHODS, BLENDER) or (is_key(name) and all(_has_look(own[obj][name]) for obj in meshes))
+    ]
     if not shown:
         raise SinewError(f"the page has {', '.join(METHODS)} and blender: choose one of them")
     if not isinstance(frames[0], Pose):
@@ -179,17 +195,26 @@ def page(
     notes = [*NOTES, *left_out]
     for obj, others in meshes.items():
         try:
-            skinned.append(_read(obj, [obj, *others], shown))
+            looks = {name: variant for name, variant in own[obj].items() if name in shown}
+            skinned.append(_read(obj, [obj, *others], shown, looks))
         except SinewError as error:
             notes.append(f"{obj.name}: left out: {error}")
     if not skinned:
         raise SinewError("; ".join(notes[len(NOTES) :]))
-    labels = {name: properties.method_label(name) for name in shown}
-    if any(each.part.mix is not None for each in skinned):
+    labels = {name: _label(name) for name in shown}
+    # A variant says itself whether it is mixed.
+    if any(each.part.mix is not None for each in skinned) and not all(map(is_key, shown)):
         labels = {MIX: "Painted Mix", **labels} if found else {**labels, MIX: "Painted Mix"}
-    missing = [properties.method_label(name) for name in methods if name not in shown]
+    missing = [_label(name) for name in methods if name not in shown]
     if missing:
         notes.append(f"Not in this page: {', '.join(missing)}.")
+    smoothed = [
+        _label(name)
+        for name in shown
+        if any("delta_mush" in own[obj][name].stages for obj in own if is_key(name))
+    ]
+    if smoothed:
+        notes.append(f"Shown without Delta Mush: {', '.join(smoothed)}.")
     shown_meshes = [*skinned, *(_read_attached(obj) for obj in attached)]
     rate = POSES_A_SECOND if found else scene.render.fps / scene.render.fps_base
     parts = [each.part for each in shown_meshes]
@@ -207,8 +232,37 @@ def page(
     return viewer.page()
 
 
-def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: Sequence[str]) -> _Skinned:
-    """objects: those that Sinew may deform in the place of `obj`, and itself."""
+def _label(name: str) -> str:
+    return parse(name).title if is_key(name) else properties.method_label(name)
+
+
+def _has_look(variant: Variant) -> bool:
+    """Whether the shaders have it, but for Delta Mush."""
+    has_rule = variant.settings.get("scale_rule", BLENDER_4.name) == BLENDER_4.name
+    is_mixed = "mix" in variant.stages
+    return has_rule and variant.method in (*METHODS, BLENDER) and (not is_mixed or variant.mix in METHODS)
+
+
+def _look(variant: Variant) -> Look:
+    values, stages = variant.all_values, variant.stage_values
+    twist, bulge = (float(stages.get(name, {}).get(of, 0.0)) for name, of in STRENGTHS.items())
+    form: Form = "kim_han" if stages.get("bulge_limit", {}).get("form") == "kim_han" else "continuous"
+    mix = variant.mix if "mix" in variant.stages and variant.mix != variant.method else ""
+    own = (variant.method, mix)
+    by_hierarchy = [name for name in own if values.get(f"{name}.signs") == "hierarchy"]
+    return Look(variant.method, mix, by_hierarchy, (twist, bulge), form)
+
+
+def _read(
+    obj: bpy.types.Object,
+    objects: Sequence[bpy.types.Object],
+    methods: Sequence[str],
+    variants: Mapping[str, Variant],
+) -> _Skinned:
+    """
+    objects   those that Sinew may deform in the place of `obj`, and itself
+    variants  those among the methods, by their keys
+    """
     depsgraph = bpy.context.evaluated_depsgraph_get()
     found = session.states_of([each for each in objects if properties.has_sinew(each)], depsgraph)
     if not found:
@@ -218,7 +272,9 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
     skins = bound.skin_stack.skins
     if len(skins) != 1 or skins[0].mask is not None:
         raise SinewError("several Armature modifiers deform it, or one with a vertex group")
-    if settings.scale_rule != BLENDER_4.name:
+    rules = {each.settings.get("scale_rule", settings.scale_rule) for each in variants.values()}
+    rules |= {settings.scale_rule} if set(methods) - {BLENDER, *variants} else set()
+    if rules - {BLENDER_4.name}:
         raise SinewError(f"its rule for scale is not {BLENDER_4.label}")
     modifier, replaced = attach.replaced_modifiers(obj_of_state)[0]
     armature = replaced.armature
@@ -234,14 +290,19 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         mesh = upstream_proxy.evaluated_mesh(obj_of_state, depsgraph)
     triangles = mesh_io.read_triangles(mesh)
     mix = _mix_of(obj, bound)
+    looks = {name: _look(variant) for name, variant in variants.items()}
+    needed = {*methods, *(mix or ()), *(name for look in looks.values() for name in (look.method, look.mix))}
     centres = None
-    if "cor" in methods or (mix is not None and "cor" in mix[:2]):
+    if "cor" in needed:
         data = VertexData(weighting, its_source.surface_points, triangles, its_source.stored)
         found_centres = data.of("cor", space)
         assert found_centres is not None
         centres = transformed(found_centres, space).astype(np.float32)
     signs = stage_settings.method_values(settings, METHODS)
     by_hierarchy = [name for name in METHODS if signs.get(f"{name}.signs") == "hierarchy"]
+    has_signs = by_hierarchy or any(look.by_hierarchy for look in looks.values())
+    shares = bound.first_deformer.mix_weights
+    is_mixed = shares is not None and (mix is not None or any(look.mix for look in looks.values()))
     part = Part(
         obj.name,
         points,
@@ -253,30 +314,34 @@ def _read(obj: bpy.types.Object, objects: Sequence[bpy.types.Object], methods: S
         centres,
         mix,
         by_hierarchy,
-        weighting.bones.twists.parents if by_hierarchy else None,
-        _stages_of(settings, bound, len(points)),
+        weighting.bones.twists.parents if has_signs else None,
+        _stages_of(settings, bound, len(points), looks.values()),
+        np.clip(shares, 0.0, 1.0) if is_mixed else None,
+        looks,
     )
     return _Skinned(
         obj_of_state, armature, bound, rest.copy(), space, part, follows_turns=settings.twist_spread.turns
     )
 
 
-def _stages_of(settings: properties.SinewSettings, bound: Bound, vertices: int) -> Stages | None:
-    """Returns the stages that are on and that the shaders have."""
+def _stages_of(
+    settings: properties.SinewSettings, bound: Bound, vertices: int, looks: Iterable[Look]
+) -> Stages | None:
+    """Returns the stages that are on or that a look has, of those that the shaders have."""
     after = bound.skin_stack.stages_after
-    values = {} if after is None else stage_values(settings)
-    strengths = [("twist_spread", "amount"), ("bulge_limit", "strength")]
-    names = [name for name, _strength in strengths if name in values]
-    if after is None or not names:
+    if after is None:
         return None
-    amounts = np.zeros((vertices, 2), np.float32)
-    for column, (name, strength) in enumerate(strengths):
-        if name in values:
-            amounts[:, column] = values[name][strength] * after.masks.get(name, 1.0)
+    values = stage_values(settings)
+    of_file = [float(values[name][of]) if name in values else 0.0 for name, of in STRENGTHS.items()]
+    if not any(name in values for name in STRENGTHS) and not any(any(look.strengths) for look in looks):
+        return None
+    masks = [np.broadcast_to(after.masks.get(name, 1.0), vertices) for name in STRENGTHS]
     form = values["bulge_limit"]["form"] if "bulge_limit" in values else "continuous"
     bones = bound.first_deformer.weighting.bones
-    labels = [stage_settings.STAGES[name].label for name in names]
-    return Stages(labels, amounts.clip(0.0, 1.0), form, bones.twists, segments(bones))
+    labels = [stage_settings.STAGES[name].label for name in STRENGTHS if name in values]
+    look = Look(settings.method, strengths=(of_file[0], of_file[1]), form=form)
+    stacked = np.stack(masks, axis=1).astype(np.float32)
+    return Stages(labels, look, stacked, bones.twists, segments(bones))
 
 
 def _read_attached(obj: bpy.types.Object) -> _Attached:
@@ -291,7 +356,7 @@ def _read_attached(obj: bpy.types.Object) -> _Attached:
     return _Attached(obj, Part(obj.name, points, of_one, surface.triangles, surface.edges, _STILL, "lbs"))
 
 
-def _mix_of(obj: bpy.types.Object, bound: Bound) -> tuple[str, str, np.ndarray] | None:
+def _mix_of(obj: bpy.types.Object, bound: Bound) -> tuple[str, str] | None:
     """Returns the painted mix that the mesh itself has, where the shaders have both methods."""
     if not properties.has_sinew(obj):
         return None
@@ -299,4 +364,4 @@ def _mix_of(obj: bpy.types.Object, bound: Bound) -> tuple[str, str, np.ndarray] 
     first, second = settings.method, settings.mixed_method
     if shares is None or first == second or not {first, second} <= set(METHODS):
         return None
-    return first, second, np.clip(shares, 0.0, 1.0)
+    return first, second

@@ -9,8 +9,8 @@ import base64
 import json
 import re
 import zlib
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from pathlib import Path
 from typing import Any, Literal, TypeAlias
@@ -48,32 +48,61 @@ _RAMP_STOPS = 64
 _TEXTS = {"distance": "The distance of each vertex from where Blender's Armature modifier takes it."}
 
 
+@dataclass(frozen=True)
+class Look:
+    """How a mesh is deformed under a name of the page, of what the shaders have.
+
+    method        one of METHODS; BLENDER for that of the Armature modifier
+    mix           the second method of the painted mix; empty without one
+    by_hierarchy  of these, those whose signs are from the hierarchy
+    strengths     of Twist Spread and of Limit Bulge, 0 to 1; 0 where it is off
+    form          of Limit Bulge
+    """
+
+    method: str
+    mix: str = ""
+    by_hierarchy: Sequence[str] = ()
+    strengths: tuple[float, float] = (0.0, 0.0)
+    form: Form = "continuous"
+
+
 @dataclass
 class Stages:
     """The stages of a mesh after the blend that the shaders have.
 
     names     of those that are on
-    amounts   float32 [vertices, 2], how much each vertex gets of Twist Spread and of Limit Bulge, 0 to 1
-    form      of Limit Bulge
+    look      of the file: which are on, and how
+    masks     float32 [vertices, 2], the weights of the vertex groups of Twist Spread and of Limit Bulge
     twists    of the bones
     segments  float32 [bones, 3] each: heads and tails at rest, armature space
-    twist, bulge  those of the library, after bind()
     """
 
     names: list[str]
-    amounts: np.ndarray
-    form: Form
+    look: Look
+    masks: np.ndarray
     twists: Twists
     segments: tuple[np.ndarray, np.ndarray]
-    twist: sinew.TwistSpread = field(init=False)
-    bulge: sinew.BulgeLimit = field(init=False)
+    _made: dict[tuple[float, float], tuple[sinew.TwistSpread, sinew.BulgeLimit]] = field(default_factory=dict)
 
-    def bind(self, binding: sinew.Binding, rest_bones: np.ndarray, mix: np.ndarray | None) -> None:
-        of, (spread, limited) = self.twists, self.amounts.T
-        self.twist = sinew.TwistSpread(
-            binding, of.rows, of.heads, of.tails, rest_bones, parents=of.parents, weights=spread, mix=mix
-        )
-        self.bulge = sinew.BulgeLimit(binding, *self.segments, weights=limited)
+    def bind(
+        self, binding: sinew.Binding, rest_bones: np.ndarray, mix: np.ndarray | None, looks: Iterable[Look]
+    ) -> None:
+        of = self.twists
+        for strengths in {self.look.strengths, *(look.strengths for look in looks)}:
+            spread, limited = (self.masks * np.array(strengths, np.float32)).clip(0.0, 1.0).T
+            twist = sinew.TwistSpread(
+                binding, of.rows, of.heads, of.tails, rest_bones, parents=of.parents, weights=spread, mix=mix
+            )
+            self._made[strengths] = twist, sinew.BulgeLimit(binding, *self.segments, weights=limited)
+
+    def of(self, look: Look) -> tuple[sinew.TwistSpread, sinew.BulgeLimit]:
+        """Those of the library, after bind()."""
+        return self._made[look.strengths]
+
+    def set_rest_points(self, points: np.ndarray) -> None:
+        for twist, bulge in self._made.values():
+            twist.set_rest_points(points)
+            bulge.set_rest_points(points)
 
 
 @dataclass
@@ -84,11 +113,12 @@ class Part:
     rest_bones  float32 [bones, 4, 4], from each bone's own axes
     blender     the method of its Armature modifier, one of METHODS
     centres     float32 [vertices, 3], for `cor`; None without it
-    mix         the two methods of the painted mix, and float32 [vertices], the share of the second; None
-                without it
-    by_hierarchy  the methods whose signs are from the hierarchy
-    parents       int32 [bones], -1 for none; given where there are such methods
+    mix         the two methods of the file's painted mix; None without it
+    by_hierarchy  the methods whose signs are from the hierarchy in the file
+    parents       int32 [bones], -1 for none; given where there are such methods, or a variant has some
     stages        None without any
+    shares        float32 [vertices], of the second method of a mix; None without a mix
+    variants      by their keys
     """
 
     name: str
@@ -99,10 +129,12 @@ class Part:
     rest_bones: np.ndarray
     blender: str
     centres: np.ndarray | None = None
-    mix: tuple[str, str, np.ndarray] | None = None
+    mix: tuple[str, str] | None = None
     by_hierarchy: Sequence[str] = ()
     parents: np.ndarray | None = None
     stages: Stages | None = None
+    shares: np.ndarray | None = None
+    variants: Mapping[str, Look] = field(default_factory=dict)
     _palettes: list[np.ndarray] = field(default_factory=list)
     _worlds: list[np.ndarray] = field(default_factory=list)
     _rests: list[np.ndarray] = field(default_factory=list)
@@ -123,11 +155,24 @@ class Part:
         )
         self._deformers: dict[str, sinew.Deformer] = {}
         if self.stages is not None:
-            self.stages.bind(self._binding, self.rest_bones, None if self.mix is None else self.mix[2])
+            self.stages.bind(self._binding, self.rest_bones, self.shares, self.variants.values())
 
-    def has(self, method: str) -> bool:
-        wanted = {MIX: self.mix, "cor": self.centres}
-        return wanted.get(method, self.rest) is not None
+    def look(self, name: str) -> Look:
+        """Returns BLENDER's where it lacks what it needs.
+
+        name  a method, BLENDER, MIX or the key of a variant
+        """
+        if name in self.variants:
+            own = self.variants[name]
+            has_centres = self.centres is not None or "cor" not in (own.method, own.mix)
+            return own if has_centres else replace(own, method=BLENDER, mix="")
+        lacks = {MIX: self.mix is None, "cor": self.centres is None}
+        if name not in (*METHODS, MIX) or lacks.get(name):
+            return Look(BLENDER)
+        first, second = self.mix if name == MIX and self.mix is not None else (name, "")
+        own = Look(first, second, self.by_hierarchy)
+        of_file = None if self.stages is None else self.stages.look
+        return own if of_file is None else replace(own, strengths=of_file.strengths, form=of_file.form)
 
     def add_frame(
         self,
@@ -145,9 +190,10 @@ class Part:
         turns   as sinew.Deformer.deform takes them
         """
         self._rests.append(self.rest if rest is None else rest)
-        of_stages = () if self.stages is None else (self.stages.twist, self.stages.bulge)
-        for each in (*self._deformers.values(), *of_stages):
+        for each in self._deformers.values():
             each.set_rest_points(self._rests[-1])
+        if self.stages is not None:
+            self.stages.set_rest_points(self._rests[-1])
         # Not with numpy's product: see vectors.transformed().
         motions = np.einsum("bij,bjk->bik", posed.astype(np.float64), self._rest_inverses)
         split = sinew.affine.split_scale(motions, self.rest_bones.astype(np.float64))
@@ -178,7 +224,7 @@ class Part:
     ) -> None:
         inputs = np.array(twists, np.float32).reshape(-1, 2 + len(NOT_TOLD))
         amounts, curves, channels = inputs[:, 0], inputs[:, 1], inputs[:, 2:]
-        of, angles = stages.twists, stages.twist.angles(motions, channels)
+        of, angles = stages.twists, stages.of(stages.look)[0].angles(motions, channels)
         add_twists(buffer, of.rows, amounts * angles, curves)
         rest, (heads, tails) = self.rest_bones.astype(np.float64), stages.segments
         shorter, _swings = twist_angles(motions.astype(np.float64), rest, of.rows, tails - heads)
@@ -191,30 +237,32 @@ class Part:
             add_turns(buffer, of.rows, around, amounts * parts.max(axis=0, initial=0.0), of.parents)
         self._motions, self._inputs = motions, (amounts, curves, channels)
 
-    def world_points(self, method: str) -> np.ndarray:
-        """float64 [vertices, 3], of the frame that was added last; those of Blender's method where it lacks
-        what `method` needs."""
-        is_own = method != BLENDER and self.has(method)
-        first = second = method if is_own else self.blender
-        mix = None
-        if method == MIX and self.mix is not None:
-            first, second, shares = self.mix
-            mix = second, shares
-        if method not in self._deformers:
-            self._deformers[method] = sinew.Deformer(self._binding, first, mix=mix)
-            self._deformers[method].set_rest_points(self._rests[-1])
-        points = self._deformers[method].deform(
+    def world_points(self, name: str) -> np.ndarray:
+        """float64 [vertices, 3], of the frame that was added last.
+
+        name  as look() takes it
+        """
+        look = self.look(name)
+        is_own = look.method != BLENDER
+        first = look.method if is_own else self.blender
+        shares = self.shares if is_own and look.mix else None
+        second = "" if shares is None else look.mix
+        if name not in self._deformers:
+            mix = None if shares is None else (second, shares)
+            self._deformers[name] = sinew.Deformer(self._binding, first, mix=mix)
+            self._deformers[name].set_rest_points(self._rests[-1])
+        signs = {f"{each}.signs": "hierarchy" for each in look.by_hierarchy if each in (first, second)}
+        points = self._deformers[name].deform(
             self._posed,
             rest_inverses=self._rest_inverses,
-            parameters={f"{name}.signs": "hierarchy" for name in self.by_hierarchy if name in (first, second)}
-            if is_own
-            else None,
+            parameters=signs if is_own else None,
             parents=self.parents,
             turns=self._turns,
         )
         if is_own and self.stages is not None:
+            twist, bulge = self.stages.of(look)
             amounts, curves, channels = self._inputs
-            self.stages.twist.apply(
+            twist.apply(
                 points,
                 self._motions,
                 points,
@@ -222,9 +270,9 @@ class Part:
                 curves=curves,
                 channels=channels,
                 blend=blend_of(first),
-                mix_blend=blend_of(second),
+                mix_blend=blend_of(second or first),
             )
-            self.stages.bulge.apply(points, self._motions, points, form=self.stages.form)
+            bulge.apply(points, self._motions, points, form=look.form)
         return transformed(points, self._worlds[-1])
 
     def world_rest(self) -> np.ndarray:
@@ -245,10 +293,10 @@ class Part:
         }
         if self.centres is not None:
             found["centres"] = self.centres
-        if self.mix is not None:
-            found["shares"] = self.mix[2]
+        if self.shares is not None:
+            found["shares"] = self.shares
         if self.stages is not None:
-            found["amounts"] = self.stages.amounts
+            found["masks"] = self.stages.masks
         has_moved = np.zeros(len(self.rest), dtype=bool)
         for rest in self._rests:
             if rest is not self.rest:
@@ -285,7 +333,8 @@ class Found:
 class Viewer:
     """The parts and frames of a page.
 
-    methods  the names of those to choose from, of METHODS, MIX and BLENDER, with their labels
+    methods  the names of those to choose from, of METHODS, MIX, BLENDER and keys of variants, with their
+             labels
     rate     frames a second
     unit     of lengths: "m", or "units"
     notes    sentences on what the page leaves out
@@ -378,10 +427,8 @@ class Viewer:
                 {
                     "name": part.name,
                     "blender": part.blender,
-                    "mix": part.mix and part.mix[:2],
-                    "hierarchy": part.by_hierarchy,
+                    "looks": {name: asdict(part.look(name)) for name in {**self.methods, BLENDER: ""}},
                     "stages": part.stages.names if part.stages else [],
-                    "form": part.stages.form if part.stages else "",
                     "arrays": arrays,
                 }
                 for part, arrays in zip(self.parts, places, strict=True)

@@ -2,4 +2,4 @@
 """Keeps variants with a character in the file, and uses them by a click."""
 
 # What other features may import.
-PUBLIC = ("stored",)
+PUBLIC = ("choices", "keys", "stored")

@@ -10,16 +10,12 @@ from ...attach.feature import Feature
 from ...base.errors import SinewError, WrongUse
 from ...deform import session
 from ...skinning.parameters import PRESETS
-from ...skinning.variants import BLENDER, FILE, Variant, named, parse
+from ...skinning.variants import FILE, Variant, named, parse
 from ...ui import character, operators, stepped
 from ...ui.operators import OnSinewObjects
 from ...ui.sidebar import Sidebar
 from ...ui.translations import tr
-from . import stored
-
-AS_BLENDER = "As Blender"
-# Those that every character has.
-ALWAYS = (parse(f"{AS_BLENDER}={BLENDER}"), *(parse(name) for name in PRESETS))
+from . import choices, keys, stored
 
 ACTIONS = (
     ("RENAME", "Rename\u2026", "Give it a name of its own", "NONE", 0),
@@ -134,27 +130,22 @@ class SINEW_PT_variants(Sidebar, operators.OfSkinned, bpy.types.Panel):
         if lead is None:
             return
         current, column = variant_settings.read(lead), layout.column(align=True)
-        for variant in ALWAYS:
-            _draw_use(column, variant, current)
+        for variant in choices.ALWAYS:
+            choices.draw_use(column, variant, current)
         for number, text in enumerate(stored.lines(context)):
             row, variant = column.row(align=True), stored.read(text)
             if variant is None:
                 row.label(text=tr("Of a newer Sinew: {text}", text=text), icon="ERROR", translate=False)
             else:
-                _draw_use(row, variant, current)
+                choices.draw_use(row, variant, current)
             row.operator_menu_enum(
                 "sinew.edit_variant", "action", text="", icon="DOWNARROW_HLT"
             ).number = number
         stepped.draw_progress(layout, "sinew.recommend")
         layout.operator("sinew.add_variant", text="Add What Is Set Now", icon="ADD")
-
-
-def _draw_use(layout: bpy.types.UILayout, variant: Variant, current: Variant) -> None:
-    text = tr(variant.name) if variant in ALWAYS and variant.name else variant.name or tr(variant.label)
-    button = layout.operator(
-        "sinew.use_variant", text=text, depress=variant.agrees_with(current), translate=False
-    )
-    button.variant = variant.key
+        row = layout.row(align=True)
+        row.operator("sinew.contact_sheet", icon="IMGDISPLAY")
+        row.operator("sinew.variant_keys", icon="LINENUMBERS_ON")
 
 
 def _current(context: bpy.types.Context) -> Variant:
@@ -164,4 +155,10 @@ def _current(context: bpy.types.Context) -> Variant:
     return variant_settings.read(lead)
 
 
-FEATURE = Feature((SINEW_OT_add_variant, SINEW_OT_use_variant, SINEW_OT_edit_variant, SINEW_PT_variants))
+FEATURE = Feature(
+    (
+        *(SINEW_OT_add_variant, SINEW_OT_use_variant, SINEW_OT_edit_variant, keys.SINEW_OT_variant_keys),
+        *(SINEW_PT_variants, keys.SINEW_MT_variants_pie),
+    ),
+    end=keys.forget,
+)

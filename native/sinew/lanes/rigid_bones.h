@@ -2,6 +2,7 @@
 #pragma once
 
 #include <algorithm>
+#include <iterator>
 
 #include "sinew/lanes/kernel.h"
 
@@ -9,16 +10,16 @@ namespace sinew {
 
 /// Kernel::scaled_bone_rows for a method that blends rotations, with Method::prepare.
 ///
-/// kRow   rows of Float4 for each bone
-/// write  stores one prepared bone: write(bone, row, scale)
-template <class Method, std::size_t kRow, auto write>
+/// rest_row  Kernel::rest_row
+/// write     stores one prepared bone: write(bone, row, scale)
+template <class Method, const auto& rest_row, auto write>
 void scaled_bone_rows(const Bones& bones, Palette& palette) {
     for (const std::int32_t index : std::span(palette.scaled, palette.scaled_count)) {
         const auto bone = static_cast<std::size_t>(index);
         const auto number = static_cast<std::size_t>(bones.used[bone]);
         const auto motion =
             Method::prepare(cast<double>(bones.pose.posed_from_rest[number]), bones.rest_bone(bone));
-        write(motion, palette.bones + kRow * bone, palette.scales + kDisplacementRows * bone);
+        write(motion, palette.bones + std::size(rest_row) * bone, palette.scales + kDisplacementRows * bone);
         palette.sizes[bone] = size_of(to_quat_vec(motion.rigid).translation);
         if (!motion.has_scale) continue;
         if (!palette.any_scale) {

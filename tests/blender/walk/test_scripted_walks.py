@@ -45,6 +45,7 @@ CASES = {
     "a heat map of a shared mesh": "duplicate Arm; add Arm; frame 6; heat Arm; update; frame 7; "
     "heat Arm 0.9",
     "appended": "append; frame 2; frame 11",
+    "appended, and off at once": "~append; enabled 'object 1'; frame 6",
     "a duplicate that is off, its original deleted": "duplicate Arm; add Arm dq; enabled Arm; duplicate Arm; "
     "delete_object Arm; remove 'object 2'; remove_all",
     "centres of a mesh that changes": "add Arm 0.9 cor; frame 8; move_vertices Arm; frame 9",

@@ -181,6 +181,8 @@ class BlenderSide(Side):
     def __init__(self) -> None:
         # The modifiers that Sinew reports as replaced, by the name of each object.
         self.runs: dict[str, list[str]] = {}
+        # Those that Sinew's side reported an error for when it was last asked, whatever undo has restored.
+        self.refused: set[str] = set()
 
     def has_sinew(self, obj: bpy.types.Object) -> bool:
         return bool(obj.pass_index & DRIVEN)
@@ -431,7 +433,14 @@ class BlenderSide(Side):
             if obj.library is None:
                 wrong += self._adopt(obj, claim)
             run = self.runs.get(obj.name_full, [])
+            was_refused = obj.name_full in self.refused
+            if claim is not None and claim["error"]:
+                self.refused.add(obj.name_full)
+            else:
+                self.refused.discard(obj.name_full)
             if self.is_on(obj) and self.is_method_keyed(obj):
+                if was_refused:
+                    self._use_keyed_flags(obj)
                 continue
             on = self.has_sinew(obj) and self.is_on(obj) and not shows_own_shape_in_its_mode(obj)
             for modifier in armature_modifiers(obj):

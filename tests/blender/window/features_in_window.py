@@ -21,7 +21,7 @@ import window
 ZIP, FOLDER = window.arguments()
 RIG = FOLDER / "human.blend"
 # The last one is at work when Blender ends.
-PARTS = ("language", "lesson", "export", "page", *(["blend"] if RIG.exists() else []), "precompute")
+PARTS = ("language", "lesson", "export", "page", "sheet", *(["blend"] if RIG.exists() else []), "precompute")
 TICK = 0.1
 
 

@@ -18,7 +18,7 @@ pytestmark = pytest.mark.window
 TOLERANCE = 2e-5
 
 
-PARTS = ("language", "lesson", "export", "page", "blend", "precompute")
+PARTS = ("language", "lesson", "export", "page", "sheet", "blend", "precompute")
 
 
 @pytest.fixture(scope="module")
@@ -43,7 +43,7 @@ def part_of(name: str):
     return part
 
 
-language, lesson, export, page, blend, precompute = map(part_of, PARTS)
+language, lesson, export, page, sheet, blend, precompute = map(part_of, PARTS)
 
 
 def test_blender_shows_german(language):
@@ -131,6 +131,24 @@ def test_a_comparison_is_saved_as_a_page(page):
     """With the file browser, then in steps: Esc leaves no file, and the scene at its frame."""
     assert page["stopped"] == [False, 3]
     assert page["saved"] == [True, True, 3]
+
+
+def test_a_click_on_a_contact_sheet_goes_there(sheet):
+    """By its variant, in its pose; Backspace and Esc bring back all that the artist saw."""
+    assert sheet["opened"] == [True, True]
+    # In the pose: another variant by a key, then back to the sheet.
+    assert sheet["a cell"] == ["cor", True, False, "cor", True, False, True]
+    assert sheet["another"] == ["dq", True, False, "cor", True, False, True]
+    assert sheet["a label"] == ["blender", False, True]
+    assert sheet["keys"] == ["dq", 2, True]
+    assert sheet["closed"] == [True, True, True]
+    assert sheet["stopped"] == [True, True]
+
+
+def test_each_use_of_a_variant_is_an_undo_step(sheet):
+    """From the sheet: without the pose that one looked at. By number keys, until Esc."""
+    assert sheet["undone"] == ["blender", True, "cor", True, "dq", True]
+    assert sheet["by keys"] == ["cor", "blender", "blender", "blender", "blender", "cor"]
 
 
 def test_blending_actions(blend):

@@ -4,6 +4,7 @@
 #include "sinew/stages/delta_mush/delta_mush.h"
 
 #include <algorithm>
+#include <limits>
 #include <string>
 
 #include "polygons.h"
@@ -218,6 +219,11 @@ TEST(DeltaMush, takes_meshes_without_faces_and_without_vertices) {
     std::vector<Vec3<float>> fewer(2, Vec3<float>(7.0f));
     EXPECT_EQ(mush.apply(fewer), Status::size);
     EXPECT_EQ(fewer, std::vector<Vec3<float>>(2, Vec3<float>(7.0f)));
+    for (const float scale :
+         {std::numeric_limits<float>::quiet_NaN(), std::numeric_limits<float>::infinity()}) {
+        EXPECT_EQ(mush.apply(points, scale), Status::not_finite);
+        EXPECT_EQ(points, (std::vector<Vec3<float>>{{0, 0, 0}, {1, 0, 0}, {5, 5, 5}}));
+    }
 }
 
 // Faces without size, and spikes.

@@ -135,9 +135,9 @@ function bindSmooth(width, height) {
   }
 }
 
-// Draws a list: each by its program in its pane, triangles or the ends of so many lines.
-function draw(list, panes, isSmooth) {
-  const { height } = canvas, width = Math.floor(canvas.width / panes);
+// Draws a list: each by its program in its port, as far as it is seen, triangles or the ends of so many lines.
+function draw(list, isSmooth) {
+  const { height } = canvas;
   if (isSmooth) bindSmooth(canvas.width, height);
   else gl.bindFramebuffer(gl.FRAMEBUFFER, null);
   gl.disable(gl.SCISSOR_TEST);
@@ -146,9 +146,9 @@ function draw(list, panes, isSmooth) {
   gl.enable(gl.DEPTH_TEST);
   gl.enable(gl.SCISSOR_TEST);
   gl.blendFunc(gl.ONE, gl.ONE_MINUS_SRC_ALPHA);
-  for (const { name, pane, values, constants: own, triangles, ends } of list) {
-    gl.viewport(pane * width, 0, width, height);
-    gl.scissor(pane * width, 0, width, height);
+  for (const { name, port, seen, values, constants: own, triangles, ends } of list) {
+    gl.viewport(port[0], 0, port[1], height);
+    gl.scissor(seen[0], 0, seen[1], height);
     use(program(name, own), values);
     if (triangles) {
       gl.bindVertexArray(triangles.vertices);

@@ -107,8 +107,8 @@ function target(format, samples) {
   return targets[key].createView();
 }
 
-function draw(list, panes, isSmooth) {
-  const samples = isSmooth ? 4 : 1, { height } = canvas, width = Math.floor(canvas.width / panes);
+function draw(list, isSmooth) {
+  const samples = isSmooth ? 4 : 1, { height } = canvas;
   const shown = context.getCurrentTexture().createView(), depth = target("depth24plus", samples);
   const colour = isSmooth
     ? { view: target(format, 4), resolveTarget: shown, storeOp: "discard" }
@@ -118,10 +118,10 @@ function draw(list, panes, isSmooth) {
       colorAttachments: [{ ...colour, loadOp: "clear" }],
       depthStencilAttachment: { view: depth, depthClearValue: 1, depthLoadOp: "clear", depthStoreOp: "discard" },
     });
-    list.forEach(({ name, pane, values, constants: own, triangles, ends }, number) => {
+    list.forEach(({ name, port, seen, values, constants: own, triangles, ends }, number) => {
       bind(pass, program(name, own, samples), values, number);
-      pass.setViewport(pane * width, 0, width, height, 0, 1);
-      pass.setScissorRect(pane * width, 0, width, height);
+      pass.setViewport(port[0], 0, port[1], height, 0, 1);
+      pass.setScissorRect(seen[0], 0, seen[1], height);
       if (triangles) {
         pass.setIndexBuffer(triangles.buffer, "uint32");
         pass.drawIndexed(triangles.count);

@@ -103,7 +103,7 @@ class Mesh {
     this.restRows = wide(arrays.rest, arrays.shares);
     this.rest = way.array("float4", this.restRows, this.count);
     this.centres = way.array("float4", wide(arrays.centres || arrays.rest), this.count);
-    this.amounts = way.array("float2", arrays.amounts || new Float32Array(2 * this.count), this.count);
+    this.amounts = new Map();
     this.palette = way.array("float4", arrays.palettes.subarray(0, 4 * BONE * this.bones), BONE * this.bones, BONE);
     this.drawAround(arrays.triangles, arrays.edges);
     const target = () => way.array("float4", null, this.count);
@@ -162,17 +162,25 @@ class Mesh {
     this.rest.write(this.restRows);
   }
 
-  skin(method, most, target) {
-    const { blender, mix, hierarchy, form } = this.about, has = method === "mix" ? mix : method in METHODS;
-    const isOwn = has && (method !== "cor" || this.arrays.centres);
-    const [first, second] = (method === "mix" && mix || Array(2).fill(isOwn ? method : blender))
-      .map((name) => METHODS[name] + (isOwn && hierarchy.includes(name) ? HIERARCHY : 0));
-    const { number, influences } = this.influences(most);
-    way.run("skin", target, {
-      sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts: this.amounts, influences,
-    }, {
+  // How much each vertex gets of Twist Spread and of Limit Bulge, 0 to 1.
+  amountsOf(strengths) {
+    const key = strengths.join(), { masks } = this.arrays;
+    if (!this.amounts.has(key)) {
+      const own = masks ? masks.map((mask, k) => Math.min(Math.max(mask * strengths[k % 2], 0), 1)) : new Float32Array(2 * this.count);
+      this.amounts.set(key, way.array("float2", own, this.count));
+    }
+    return this.amounts.get(key);
+  }
+
+  skin(name, most, target) {
+    const { blender, looks } = this.about, { method, mix, by_hierarchy, strengths, form } = looks[name];
+    const isOwn = method !== "blender", isMixed = isOwn && mix && this.arrays.shares;
+    const [first, second] = (isOwn ? [method, isMixed ? mix : method] : [blender, blender])
+      .map((one) => METHODS[one] + (isOwn && by_hierarchy.includes(one) ? HIERARCHY : 0));
+    const { number, influences } = this.influences(most), amounts = this.amountsOf(strengths);
+    way.run("skin", target, { sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts, influences }, {
       SINEW_INFLUENCES: number, METHOD: first, SECOND_METHOD: second, BULGE_FORM: FORMS[form] ?? 0,
-      STAGES: isOwn && state.stages && this.arrays.amounts ? 1 : 0,
+      STAGES: isOwn && (state.stages || isVariant(name)) && strengths.some((x) => x > 0) && this.arrays.masks ? 1 : 0,
     });
   }
 
@@ -208,8 +216,13 @@ const names = Object.keys(header.methods), last = header.frames.length - 1;
 const { findings = [], verdict = "" } = header.flex ?? {};
 const state = {
   frame: header.start, playing: false, panes: !header.flex && names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
+  // Where two are shown over each other: the share of the width that is the left one's.
+  wipe: null,
   measure: 0, most: Infinity, stages: true, finding: -1, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
 };
+const isWiped = () => state.panes === 2 && state.wipe !== null;
+// How many views are beside each other.
+const viewCount = () => (isWiped() ? 1 : state.panes);
 
 // Where the character is at a frame. One that walks away is followed; others stay where they are.
 function boxOver(frames) {
@@ -296,12 +309,13 @@ async function markOf(pane) {
 }
 
 function showMarks() {
-  const { clip_from_world } = camera(canvas.clientWidth / state.panes / canvas.clientHeight);
+  const { clip_from_world } = camera(canvas.clientWidth / viewCount() / canvas.clientHeight);
   for (const i of [0, 1]) {
     const mark = find(`mark-${i}`), place = marks[i] && moved(clip_from_world, [...marks[i].point, 1]);
     const [x, y] = place ? [place[0] / place[3], place[1] / place[3]] : [2, 2];
-    mark.hidden = !(Math.abs(x) < 1 && Math.abs(y) < 1 && place[3] > 0);
-    mark.style.left = `${50 * (1 + x + 2 * i) / state.panes}%`;
+    const isCovered = isWiped() && (1 + x) / 2 < state.wipe !== (i === 0);
+    mark.hidden = isCovered || !(Math.abs(x) < 1 && Math.abs(y) < 1 && place[3] > 0);
+    mark.style.left = `${50 * (1 + x + 2 * (isWiped() ? 0 : i)) / viewCount()}%`;
     mark.style.top = `${50 * (1 - y)}%`;
   }
 }
@@ -316,9 +330,16 @@ function inPane(pane, aspect) {
     line: prefersDark.matches ? [0.27, 0.28, 0.29] : [0.1, 0.11, 0.12],
   };
   return [...meshes.map((mesh) => ({
-    name: "draw", pane, constants, triangles: mesh.triangles,
+    name: "draw", constants, triangles: mesh.triangles,
     values: { ...shared, ...mesh.panes[pane], world_from_armature: mesh.world },
-  })), { name: "ground", pane, ends: GROUND_ENDS, values: ground }];
+  })), { name: "ground", ends: GROUND_ENDS, values: ground }];
+}
+
+// The left edge and the width, in pixels, of what a pane draws, and of what is seen of it.
+function placesOf(pane, width) {
+  const each = Math.floor(width / viewCount()), cut = Math.round(width * state.wipe);
+  if (!isWiped()) return { port: [pane * each, each], seen: [pane * each, each] };
+  return { port: [0, width], seen: pane ? [cut, width - cut] : [0, cut] };
 }
 
 function draw(isSmooth = false) {
@@ -326,8 +347,8 @@ function draw(isSmooth = false) {
   const [width, height] = [canvas.clientWidth, canvas.clientHeight].map((x) => Math.max(Math.round(x * density), 1));
   if (canvas.width !== width || canvas.height !== height) Object.assign(canvas, { width, height });
   skinAll();
-  const { panes } = state, aspect = Math.floor(width / panes) / height;
-  way.draw([0, 1].slice(0, panes).flatMap((pane) => inPane(pane, aspect)), panes, isSmooth);
+  const aspect = Math.floor(width / viewCount()) / height, panes = [0, 1].slice(0, state.panes);
+  way.draw(panes.flatMap((pane) => inPane(pane, aspect).map((own) => ({ ...own, ...placesOf(pane, width) }))), isSmooth);
   showMarks();
 }
 
@@ -394,7 +415,9 @@ function changed() {
 
 const methodLabel = (name) => header.methods[name];
 const staged = [...new Set(header.parts.flatMap((part) => part.stages))], stagesLabel = staged.join(" and ");
-const hasStages = (name) => staged.length && state.stages && name !== "blender";
+// The key of a variant, which has stages of its own.
+const isVariant = (name) => name.includes("=");
+const hasStages = (name) => staged.length && state.stages && name !== "blender" && !isVariant(name);
 const shownLabel = (name) => methodLabel(name) + (hasStages(name) ? ` with ${stagesLabel}` : "");
 
 function say(text) {
@@ -416,7 +439,8 @@ function show() {
   showFrame();
   document.body.classList.toggle("playing", state.playing);
   find("play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
-  for (const input of document.querySelectorAll("[name=panes]")) input.checked = Number(input.value) === state.panes;
+  const panes = isWiped() ? "wipe" : String(state.panes);
+  for (const input of document.querySelectorAll("[name=panes]")) input.checked = input.value === panes;
   findings.forEach((_, i) => {
     const [button, more] = find("findings").children[i].children;
     button.setAttribute("aria-pressed", i === state.finding);
@@ -431,7 +455,10 @@ function show() {
     pane.hidden = i >= state.panes;
     pane.style.left = `${100 * (i + 0.5) / state.panes}%`;
   });
-  find("stage").classList.toggle("has-two", state.panes === 2);
+  find("stage").classList.toggle("has-two", viewCount() === 2);
+  find("wipe").hidden = !isWiped();
+  find("wipe").style.left = `${100 * state.wipe}%`;
+  find("wipe").setAttribute("aria-valuenow", Math.round(100 * state.wipe));
   const shown = state.methods.slice(0, state.panes).map(shownLabel).join(" and ");
   const measure = header.measures[state.measure - 1];
   canvas.setAttribute("aria-label", `${header.title}: ${shown}${measure ? `, ${measure.label}` : ""}`);
@@ -489,7 +516,7 @@ async function choose(index) {
 
 // Along the normal, or as near to that as nothing is in between; some lengths of the bone around the place.
 async function viewOf({ point, normal }, size) {
-  const its = camera(canvas.clientWidth / state.panes / canvas.clientHeight);
+  const its = camera(canvas.clientWidth / viewCount() / canvas.clientHeight);
   const reach = Math.min(Math.max(1.6 * size, radius / 12), radius / 2);
   const [yaw, pitch] = [Math.atan2(normal[0], -normal[1]), Math.min(Math.max(Math.asin(normal[2]), -1), 1)];
   const views = [{ yaw, pitch }];
@@ -565,6 +592,10 @@ const actions = {
   ",": () => set({ playing: false, frame: (state.frame + last) % (last + 1) }),
   ".": () => set({ playing: false, frame: (state.frame + 1) % (last + 1) }),
   f: flip,
+  w: () => {
+    set({ panes: 2, wipe: isWiped() ? null : 0.5 });
+    say(isWiped() ? "Wipe" : "Side by side");
+  },
   ...(staged.length && {
     s: () => {
       set({ stages: !state.stages });
@@ -609,7 +640,8 @@ function connect() {
     return label;
   }));
   find("panel").addEventListener("change", ({ target }) => {
-    if (target.name === "panes" || target.name === "measure") set({ [target.name]: Number(target.value) });
+    if (target.name === "measure") set({ measure: Number(target.value) });
+    if (target.name === "panes") set({ panes: target.value === "1" ? 1 : 2, wipe: target.value === "wipe" ? 0.5 : null });
   });
   for (const form of ["panel", "time"]) find(form).addEventListener("submit", (event) => event.preventDefault());
   find("flip").addEventListener("click", flip);
@@ -654,6 +686,23 @@ function connectKeys() {
   });
 }
 
+// Between the two that a wipe shows.
+function connectWipe() {
+  const handle = find("wipe"), move = (share) => set({ wipe: Math.min(Math.max(share, 0), 1) });
+  handle.addEventListener("pointerdown", (event) => handle.setPointerCapture(event.pointerId));
+  handle.addEventListener("pointermove", (event) => {
+    const box = find("stage").getBoundingClientRect();
+    if (handle.hasPointerCapture(event.pointerId)) move((event.clientX - box.left) / box.width);
+  });
+  const steps = { ArrowLeft: -0.02, ArrowDown: -0.02, ArrowRight: 0.02, ArrowUp: 0.02, Home: -1, End: 1 };
+  handle.addEventListener("keydown", (event) => {
+    if (!(event.key in steps)) return;
+    event.preventDefault();
+    event.stopPropagation();
+    move(state.wipe + steps[event.key]);
+  });
+}
+
 function connectCanvas() {
   const pointers = new Map();
   canvas.addEventListener("contextmenu", (event) => event.preventDefault());
@@ -666,7 +715,7 @@ function connectCanvas() {
     const before = pointers.get(event.pointerId);
     if (!before) return;
     const [dx, dy] = [event.clientX - before.clientX, event.clientY - before.clientY];
-    const shorter = Math.min(canvas.clientWidth / state.panes, canvas.clientHeight);
+    const shorter = Math.min(canvas.clientWidth / viewCount(), canvas.clientHeight);
     const other = [...pointers.values()].find((pointer) => pointer.pointerId !== event.pointerId);
     pointers.set(event.pointerId, event);
     if (other) {
@@ -688,6 +737,7 @@ const ways = { webgl, webgpu }, named = (wanted ?? "").split(",").filter((name) 
 await begin(named.length ? named.map((name) => ways[name]) : [(...given) => webgpu(...given, true), webgl]);
 if (!way) return;
 connect();
+connectWipe();
 listFindings();
 connectKeys();
 prefersDark.addEventListener("change", changed);

@@ -50,7 +50,7 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 
 SINEW_KERNEL(Cor, .rest_row = kCentreRestRow, .signed_float4s = 1, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Cor, 4, write_centre_bone>,
+             .scaled_bone_rows = scaled_bone_rows<Cor, kCentreRestRow, write_centre_bone>,
              .pack_vertex_data = VertexNumbers<Cor::info.vertex_floats>::pack)
 
 }  // namespace sinew

@@ -666,7 +666,7 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 
 SINEW_KERNEL(Ddm, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Ddm, 4, write_centre_bone>,
+             .scaled_bone_rows = scaled_bone_rows<Ddm, kCentreRestRow, write_centre_bone>,
              .pack_vertex_data = pack_moments)
 
 }  // namespace sinew

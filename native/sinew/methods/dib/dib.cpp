@@ -387,7 +387,7 @@ void write_bone(const IterativeDq::Bone<double>& bone, Float4* row, Float4* scal
 
 SINEW_KERNEL(IterativeDq, .rest_row = kCentreRestRow, .signed_float4s = 1,
              .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<IterativeDq, 4, write_bone>)
+             .scaled_bone_rows = scaled_bone_rows<IterativeDq, kCentreRestRow, write_bone>)
 
 }  // namespace sinew
 #endif

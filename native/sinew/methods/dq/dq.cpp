@@ -91,7 +91,7 @@ void write_bone(const Dq::Bone<double>& bone, Float4* row, Float4* scale) {
 }  // namespace
 
 SINEW_KERNEL(Dq, .rest_row = kRestRow, .signed_float4s = 2, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Dq, 2, write_bone>)
+             .scaled_bone_rows = scaled_bone_rows<Dq, kRestRow, write_bone>)
 
 }  // namespace sinew
 #endif

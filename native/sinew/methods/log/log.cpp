@@ -127,7 +127,7 @@ void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
 }  // namespace
 
 SINEW_KERNEL(Log, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Log, 2, write_bone>)
+             .scaled_bone_rows = scaled_bone_rows<Log, kRestRow, write_bone>)
 
 }  // namespace sinew
 #endif

@@ -77,7 +77,7 @@ void write_bone(const Qv::Bone<double>& bone, Float4* row, Float4* scale) {
 }  // namespace
 
 SINEW_KERNEL(Qv, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Qv, 2, write_bone>)
+             .scaled_bone_rows = scaled_bone_rows<Qv, kRestRow, write_bone>)
 
 }  // namespace sinew
 #endif

@@ -173,7 +173,7 @@ HWY_AFTER_NAMESPACE();
 namespace sinew {
 
 SINEW_KERNEL(Sdef, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Sdef, 4, write_centre_bone>,
+             .scaled_bone_rows = scaled_bone_rows<Sdef, kCentreRestRow, write_centre_bone>,
              .pack_vertex_data = VertexNumbers<Sdef::info.vertex_floats>::pack)
 
 }  // namespace sinew

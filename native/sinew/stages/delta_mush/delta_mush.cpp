@@ -264,6 +264,7 @@ Status DeltaMush::apply(std::span<Vec3<float>> points, float scale, std::size_t 
     const State& state = *state_;
     const MushMesh& mesh = state.mesh;
     if (points.size() != mesh.vertices.size()) return Status::size;
+    if (!std::isfinite(scale)) return Status::not_finite;
     const std::scoped_lock lock(state.mutex);
     threads = state.threads_for(threads);
     // Read once, because the compiler assumes that any stored number may change it.

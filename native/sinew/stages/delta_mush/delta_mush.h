@@ -184,6 +184,8 @@ public:
     /// points  [vertices] in the space of the rest points
     /// scale   how much of the details is added back; 1: all
     ///
+    /// Returns Status::not_finite, and changes nothing, where `scale` is not finite.
+    ///
     /// A vertex without faces is smoothed and has no details.
     Status apply(std::span<Vec3<float>> points, float scale = 1.0f, std::size_t threads = 0) const noexcept;
 

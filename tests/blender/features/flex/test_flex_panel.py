@@ -11,7 +11,9 @@ import scenes
 from sinew_addon.features.diagnose import diagnose
 from sinew_addon.features.flex import feature
 from sinew_addon.features.flex.verdict import Finding
+from sinew_addon.features.variants import choices
 from sinew_addon.io import armature_io
+from sinew_addon.skinning.variants import parse
 from whole_file import assert_same, content
 
 pytestmark = pytest.mark.long_term
@@ -44,6 +46,12 @@ def findings() -> dict[str, tuple[int, int, Finding]]:
     }
 
 
+def faults() -> dict[tuple[str, str], Finding]:
+    """By joint and name."""
+    joints = feature.results[bpy.context.scene.session_uid].verdict.joints
+    return {(joint.name, finding.limit.name): finding for joint in joints for finding in joint.findings}
+
+
 def test_it_finds_the_faults_and_changes_nothing(arm_with_a_bare_patch):
     _obj, _armature, bare = arm_with_a_bare_patch
     before = content()
@@ -52,7 +60,17 @@ def test_it_finds_the_faults_and_changes_nothing(arm_with_a_bare_patch):
     found = findings()
     assert {"unweighted", "stretch"} <= set(found)
     assert found["unweighted"][2].vertices == len(bare)
-    assert set(feature.results[bpy.context.scene.session_uid].methods) == {"lbs", "cor"}
+    # The variants of the character but the one that it has, and each says what it mends.
+    tried = feature.results[bpy.context.scene.session_uid].methods
+    labels = [choices.label(parse(key)) for key in tried]
+    assert labels[:2] == ["As Blender", "Centres of Rotation"]
+    assert len(labels) == 4
+    soft = "=dq+twist_spread+delta_mush"
+    mended = {fault for fault, finding in faults().items() if soft in finding.mends}
+    assert mended
+    assert bpy.ops.sinew.use_variant(variant=soft) == {"FINISHED"}
+    assert bpy.ops.sinew.flex() == {"FINISHED"}
+    assert mended.isdisjoint(faults())
 
 
 def test_a_click_goes_to_the_place(arm_with_a_bare_patch):

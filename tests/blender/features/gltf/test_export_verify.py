@@ -317,6 +317,21 @@ def test_envelopes(scene, tmp_path):
     assert mesh["causes"]["influences"]["largest"] > 1e-2 * mesh["diagonal"]
 
 
+@pytest.mark.parametrize("multiplied", [False, True])
+def test_envelopes_of_bendy_bones(empty_file, tmp_path, multiplied):
+    """The weights of the plain bones have the envelopes in them."""
+    obj = make_bendy(unequal=False)
+    rig = obj.parent
+    obj.modifiers["Armature"].use_bone_envelopes = not multiplied
+    for group in list(obj.vertex_groups)[1:] if not multiplied else ():
+        group.remove([vertex.index for vertex in obj.data.vertices if vertex.co.x > 2.2])
+    for bone in rig.data.bones:
+        bone.envelope_distance, bone.use_envelope_multiply = 0.6, multiplied
+        bone.head_radius = bone.tail_radius = 0.1
+    rig.data.bones[0].bbone_segments = 1
+    assert not found_causes(exported(tmp_path, "--influences", "16"))
+
+
 def test_normals(empty_file, tmp_path):
     """A tube along a bone that is scaled across: its faces' normals are at odd multiples of 15 degrees."""
     _obj, rig = scenes.make_arm(bones=1)

@@ -67,6 +67,12 @@ def test_what_is_set_is_a_variant_and_back():
     assert variant_settings.read(obj) == parse("blender")
 
 
+def is_yellow(pixels):
+    """What is far from the first row, and the end of the legend."""
+    red, green, blue = np.moveaxis(pixels.astype(int), -1, 0)
+    return (red > 120) & (green > 120) & (blue < 90)
+
+
 def test_the_command_writes_a_cell_for_each(tmp_path):
     scenes.make_arm()
     path, sheet = scenes.save(tmp_path / "arm.blend"), tmp_path / "sheet.png"
@@ -77,6 +83,13 @@ def test_the_command_writes_a_cell_for_each(tmp_path):
     # Clay in the cells, on their background.
     clay = (pixels[..., 0] - pixels[..., 2] > 8) & (pixels.sum(axis=2) > 90)
     assert clay.sum() > 2 * 96 * 96 * 0.1
+    coloured = tmp_path / "coloured.png"
+    options = "--variants", "blender, soft=dq+delta_mush:iterations=60", "--size", 96, "--difference"
+    run_sinew("compare", path, "--sheet", coloured, *options)
+    assert is_yellow(np.asarray(Image.open(coloured).convert("RGB"))).sum() > 50
+    assert not is_yellow(pixels).any()
+    wrong = run_sinew("compare", path, "--out", tmp_path, "--difference", status=2)
+    assert "it goes with --sheet" in wrong.stderr
     wrong = run_sinew("compare", path, "--sheet", sheet, "--frames", "1", status=2)
     assert "--frames does not go with it" in wrong.stderr
     wrong = run_sinew("compare", path, path, "--sheet", sheet, status=2)

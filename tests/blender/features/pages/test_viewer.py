@@ -7,6 +7,7 @@ from __future__ import annotations
 import re
 
 import bpy
+import five_meshes
 import numpy as np
 import pytest
 import read_page
@@ -15,9 +16,12 @@ from bone_buffer import bone_buffer
 from conftest import REPOSITORY
 from mathutils import Euler
 from program import run_sinew
+from sinew_addon.attach import variant_settings
+from sinew_addon.deform import session
 from sinew_addon.features.measure import heat_scale
 from sinew_addon.features.pages import viewer_page
 from sinew_addon.skinning.influences import Influences
+from sinew_addon.skinning.variants import parse
 
 FRAMES = [1, 6, 11]
 GROUP = "Painted"
@@ -81,7 +85,8 @@ def test_the_painted_mix_is_that_of_the_file(tmp_path):
     page = write_page(path, "--methods", "lbs,dq", "--frames", "1,6,11")
     header, _meshes = read_page.read(page)
     assert header["methods"] == {"lbs": "Linear Blend", "dq": "Dual Quaternion", "mix": "Painted Mix"}
-    assert header["parts"][0]["mix"] == ["dq", "cor"]
+    look = header["parts"][0]["looks"]["mix"]
+    assert (look["method"], look["mix"]) == ("dq", "cor")
     assert_has_points(page, points_of(path, "dq"), "mix", obj)
 
 
@@ -118,7 +123,7 @@ def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     page = write_page(path, "--methods", "blender,lbs,dq,cor", "--frames", "1,6,11")
     header, (arrays,) = read_page.read(page)
     assert header["parts"][0]["stages"] == ["Twist Spread", "Limit Bulge"]
-    assert header["parts"][0]["hierarchy"] == ["dq"]
+    assert header["parts"][0]["looks"]["dq"]["by_hierarchy"] == ["dq"]
     assert len(np.unique(arrays["palettes"][2, :, 6, 2])) == 3
     assert_has_points(page, points_of(path, "dq"), "mix", obj)
     obj.sinew.mix.method = "OFF"
@@ -126,9 +131,53 @@ def test_stages_and_signs_are_those_of_the_file(tmp_path, form):
     for method in ("lbs", "dq", "cor"):
         expected = points_of(path, method)
         assert_has_points(page, expected, method, obj)
-        plain = read_page.points(header["parts"][0], {**arrays, "amounts": 0 * arrays["amounts"]}, method, 2)
+        plain = read_page.points(header["parts"][0], {**arrays, "masks": 0 * arrays["masks"]}, method, 2)
         assert np.abs(plain - read_page.points(header["parts"][0], arrays, method, 2)).max() > 0.05
     assert_has_points(page, points_of(path, "blender"), "blender", obj)
+
+
+VARIANTS = (
+    "Soft=dq:signs=hierarchy+twist_spread:amount=0.6+bulge_limit:form=kim_han:strength=0.8",
+    "=dq+bulge_limit",
+    "Half=lbs+mix=cor",
+    "Plain=cor+scale_rule=4.0",
+    "As Blender=blender",
+)
+
+
+@pytest.mark.parametrize("way", ["command", "panel"])
+def test_variants_are_those_that_blender_shows(tmp_path, way):
+    """Each with stages of its own, whatever the file has, by the weights of the same vertex groups."""
+    obj = make_limb(150.0)
+    scenes.set_stage(obj, "twist_spread", amount=0.3)
+    obj.sinew.bulge_limit.group = GROUP
+    path = scenes.save(tmp_path / "arm.blend")
+    shown = f"{', '.join(VARIANTS)}, file, Mush=dq+delta_mush, qv"
+    page = tmp_path / "arm.html"
+    if way == "command":
+        run_sinew("compare", path, "--variants", shown, "--frames", "1,6,11", "--viewer", page)
+    else:
+        five_meshes.select(obj)
+        bpy.context.scene.frame_start, bpy.context.scene.frame_end = 1, 11
+        assert bpy.ops.sinew.compare(methods={"dq"}, variants=", ".join(VARIANTS[:4])) == {"FINISHED"}
+        assert bpy.ops.sinew.save_comparison(filepath=str(page)) == {"FINISHED"}
+        bpy.ops.sinew.end_comparison()
+    header, _meshes = read_page.read(page)
+    notes = " ".join(header["notes"])
+    if way == "command":
+        assert list(header["methods"]) == [*VARIANTS, "=file", "Mush=dq+delta_mush"]
+        assert header["methods"]["Soft=" + VARIANTS[0][5:]].startswith(
+            "Soft: Dual Quaternion with Twist Spread"
+        )
+        assert "Shown without Delta Mush: Mush: Dual Quaternion with Delta Mush." in notes
+        assert "Not in this page: Quaternion-Vector." in notes
+        assert_has_points(page, scenes.shapes(obj, FRAMES), "=file", obj)
+    else:
+        assert list(header["methods"]) == ["dq", *VARIANTS[:4], "mix"]
+    for key in VARIANTS[: 5 if way == "command" else 4]:
+        with session.changing(bpy.context):
+            variant_settings.use([obj], parse(key))
+        assert_has_points(page, scenes.shapes(obj, FRAMES), key, obj)
 
 
 def test_recommended_is_a_method_with_its_stages(tmp_path):
@@ -236,7 +285,7 @@ def test_a_page_alone_needs_no_folder_and_has_one_file(tmp_path):
     page = write_page(path, "--frames", "1")
     assert list(read_page.read(page)[0]["methods"]) == ["lbs", "dq", "cor"]
     assert sorted(each.name for each in tmp_path.iterdir()) == ["arm.blend", "arm.html"]
-    assert len(page.read_bytes()) < 100_000
+    assert len(page.read_bytes()) < 110_000
     for words, text in (
         ((path,), "expected --out, --viewer or both"),
         ((path, path, "--viewer", page), "a single file"),
