@@ -65,7 +65,7 @@ CRITERIA = (
     ),
     Criterion(
         "crossings",
-        "Self-Intersections",
+        "Intersections",
         "",
         "count",
         "intersects itself least",

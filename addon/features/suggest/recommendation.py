@@ -131,7 +131,8 @@ def search(
             known = values
         elif _is_kept(candidate, gains):
             best, known = tried, values
-            place = phrase(moments[gains.index(max(gains))][0])
+            name = moments[gains.index(max(gains))][0]
+            place = name if isinstance(name, Phrase) else phrase(name)
             why = phrase("{why} (most: {place})", why=phrase(candidate.why), place=place)
             whys["" if is_method else candidate.name] = why
     return Choice(best, tuple(whys.values()) if moments else ())
