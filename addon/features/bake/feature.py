@@ -139,8 +139,10 @@ class SINEW_PT_bake(Sidebar, bpy.types.Panel):
     def draw(self, context: bpy.types.Context) -> None:
         layout = self.layout
         # Meshes of one armature share them.
-        sentences = (kept.sentences_of(obj) for obj in targets(context))
-        for sentence in dict.fromkeys(chain.from_iterable(sentences)):
+        sentences = dict.fromkeys(chain(*(kept.sentences_of(obj) for obj in targets(context))))
+        if sentences:
+            layout.label(text="When it was baked:")
+        for sentence in sentences:
             draw_text(layout, sentence, icon="CHECKMARK")
         if not has_sinew_targets(context):
             return
