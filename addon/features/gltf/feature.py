@@ -21,12 +21,13 @@ from ...ui.options import with_options
 from ...ui.sidebar import Sidebar, draw_text
 from ...ui.translations import counted, tr
 from ..bake import bake_apart
+from ..measure.measured_on import OWN, MeasuredOn
 from . import export, players
 from .export_check import Check, ExportOptions
 
 # What was verified last, the largest difference first, by the session_uid of the scene. Nothing is stored in
 # files.
-results: dict[int, list[Check]] = {}
+results: dict[int, tuple[MeasuredOn, list[Check]]] = {}
 
 
 class SinewGltf(bpy.types.PropertyGroup):
@@ -117,7 +118,9 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         self.path = self.target(self.kind)
         files.check_free(self.path, self.overwrite)
         deformed = attach.deformed_meshes(list(context.scene.objects))
-        skinned = [obj.name for obj in deformed if properties.has_sinew(obj) and properties.of(obj).enabled]
+        meshes = [obj for obj in deformed if properties.has_sinew(obj) and properties.of(obj).enabled]
+        skinned = [obj.name for obj in meshes]
+        self.basis = MeasuredOn.of(context.scene, meshes, OWN, "SCENE")
         options = asdict(read_options(ExportOptions, self))
         task = {"command": "write", "objects": skinned, "options": options}
         try:
@@ -136,7 +139,7 @@ class SINEW_OT_export(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bp
         for sentence in self.outcome["left_out"]:
             self.report({"WARNING"}, sentence)
         self.report({"INFO"}, tr("Wrote {path}", path=self.path))
-        results[context.scene.session_uid] = checks
+        results[context.scene.session_uid] = self.basis, checks
 
 
 class SINEW_PT_verified(Sidebar, bpy.types.Panel):
@@ -145,10 +148,15 @@ class SINEW_PT_verified(Sidebar, bpy.types.Panel):
 
     @classmethod
     def poll(cls, context: bpy.types.Context) -> bool:
-        return bool(results.get(context.scene.session_uid))
+        _basis, checks = results.get(context.scene.session_uid, (None, []))
+        return bool(checks)
 
     def draw(self, context: bpy.types.Context) -> None:
-        layout, (worst, *others) = self.layout, results[context.scene.session_uid]
+        layout, (basis, (worst, *others)) = self.layout, results[context.scene.session_uid]
+        deformed = attach.deformed_meshes(list(context.scene.objects))
+        is_old = basis.draw(layout, context.scene, filter(properties.has_sinew, deformed))
+        layout = layout.column()
+        layout.active = not is_old
         whole, *causes = worst.sentences(characters.length_unit(context.scene))
         draw_text(layout, f"{worst.mesh}: {tr(whole)}", alert=not worst.is_explained)
         for cause in causes:

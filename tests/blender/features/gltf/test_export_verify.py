@@ -272,7 +272,11 @@ def test_the_panel_exports_and_verifies(scene, tmp_path):
         bpy.ops.sinew.export(kind=".glb", verify=True)
     assert bpy.ops.sinew.export(kind=".glb", verify=True, overwrite=True) == {"FINISHED"}
     assert [(modifier.name, modifier.type) for modifier in obj.modifiers] == before
-    (check,) = feature.results[bpy.context.scene.session_uid]
+    basis, (check,) = feature.results[bpy.context.scene.session_uid]
+    assert basis.changes(bpy.context.scene, [obj]) == []
+    obj.sinew.delta_mush.enabled = True
+    assert basis.changes(bpy.context.scene, [obj]) == ["stages"]
+    obj.sinew.delta_mush.enabled = False
     assert {**asdict(check), "explained": True} == of_command
     assert feature.SINEW_PT_verified.poll(bpy.context)
     assert bpy.ops.sinew.export(kind=".glb", overwrite=True) == {"FINISHED"}
