@@ -221,6 +221,8 @@ def _draw_fault(
     limit, key = own.limit, f"{own.limit.name} {own.joint}"
     layout.label(text=own.joint, icon="BONE_DATA", translate=False)
     _draw_place(layout, places[id(own)], own)
+    shown = filter(None, map(context.scene.objects.get, own.patch))
+    mended = [obj for obj in shown if limit.name in mending.MENDS and diagnose.has(obj, key)]
     if own.mends:
         layout.label(text="Not under", icon="SOLO_ON")
         column = layout.column(align=True)
@@ -229,10 +231,10 @@ def _draw_fault(
     elif limit.name not in told:
         told.add(limit.name)
         draw_text(layout, tr(limit.meaning))
-        draw_text(layout, tr(limit.advice))
-    for obj in filter(None, map(context.scene.objects.get, own.patch)):
-        if diagnose.has(obj, key):
-            mending.draw(layout, obj, limit.name, key)
+        if not mended:
+            draw_text(layout, tr(limit.advice))
+    for obj in mended:
+        mending.draw(layout, obj, limit.name, key)
     if others:
         draw_text(
             layout, "From it, at {joints}:", joints=names_text(_unique(each.joint for each in others), 4)
