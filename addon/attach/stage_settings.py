@@ -35,8 +35,6 @@ _CHOICES = {
     "hierarchy": ("Along the Chain", "Rotations add up from bone to bone, beyond 180 degrees"),
 }
 _LARGE_GROUP = 4
-# What riggers call parameters that the library calls otherwise.
-_LABELS = {"signs": "Rotation Path", "turns": "Beyond 180\u00b0"}
 # Scales that differ by no more than this part are the same: matrices of objects that rotate are rounded.
 SAME_SCALE = 1e-4
 # Choice of a parameter that names a method: the stage is off.
@@ -132,13 +130,9 @@ def vertex_groups(settings: bpy.types.PropertyGroup) -> dict[str, str]:
     }
 
 
-def label_of(parameter: sinew.Parameter) -> str:
-    return _LABELS.get(parameter.id, parameter.label)
-
-
 def _property(parameter: sinew.Parameter, update: Callable) -> object:
     facts = {
-        "name": label_of(parameter),
+        "name": parameter.label,
         "description": parameter.description,
         "update": update,
         "override": OVERRIDABLE,

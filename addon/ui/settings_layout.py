@@ -126,11 +126,9 @@ def _draw_parameter(
     obj: bpy.types.Object,
 ) -> None:
     if parameter.kind == "vertex_group":
-        named(layout, stage_settings.label_of(parameter)).prop_search(
-            group, parameter.id, obj, "vertex_groups", text=""
-        )
+        named(layout, parameter.label).prop_search(group, parameter.id, obj, "vertex_groups", text="")
     elif parameter.kind == "enum":
-        named(layout, stage_settings.label_of(parameter)).prop(group, parameter.id, text="")
+        named(layout, parameter.label).prop(group, parameter.id, text="")
     else:
         layout.prop(group, parameter.id)
 

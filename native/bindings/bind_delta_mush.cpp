@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #include <pybind11/numpy.h>
 
+#include <cmath>
 #include <string>
 
 #include "arrays.h"
@@ -76,6 +77,7 @@ py::array_t<float> apply(const Timed<DeltaMush>& mush, const ArrayLike& points, 
                          const Number& scale, const Threads& threads) {
     const auto given = checked_points(points, "points", mush.vertex_count());
     const float details = checked_float(scale, "scale");
+    if (!std::isfinite(details)) fail("scale", "a finite number", describe(scale));
     const std::size_t most = checked_threads(threads);
     return applied(mush, given, out, [&](auto to) { return mush.apply(to, details, most); });
 }

@@ -13,7 +13,7 @@ struct Signs {
     static constexpr std::string_view kChoices[] = {"blender", "hierarchy"};
     static constexpr Parameter kParameters[] = {
         {.id = "signs",
-         .label = "Signs",
+         .label = "Rotation Path",
          .description =
              "Which way a vertex turns between bones that are more than half a turn apart: the shorter "
              "one, as in Blender, or through the bones between them and as far as their own angles say, for "

@@ -46,7 +46,7 @@ def test_the_library_decides_what_there_is():
         assert (group is not None) == bool(method.parameters), method.name
         for parameter in method.parameters:
             assert group.properties[parameter.id].is_overridable
-            assert group.properties[parameter.id].name == stage_settings.label_of(parameter)
+            assert group.properties[parameter.id].name == parameter.label
     obj, _armature = scenes.make_arm()
     values = stage_settings.method_values(properties.of(obj), ("sdef", "lbs", ""))
     (sdef,) = (method for method in sinew.methods() if method.name == "sdef")

@@ -50,7 +50,7 @@ struct TwistSpreadStage {
          ParameterKind::boolean, 0.0, 0.0, 1.0},
         {"amount", "Amount", "How much of each twist is spread: 0 nothing, 1 all of it", "factor",
          ParameterKind::number, 1.0, 0.0, 1.0},
-        {"turns", "Follow Turns",
+        {"turns", "Beyond 180°",
          "Beyond half a turn, go as far as a bone's own Euler angles or axis and angle say, up to two turns",
          "", ParameterKind::boolean, 1.0, 0.0, 1.0},
         {"group", "Vertex Group", "How much each vertex takes part: 0 not at all, 1 fully", "factor",

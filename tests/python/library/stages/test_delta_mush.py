@@ -16,3 +16,9 @@ def test_binding_again_equals_a_new_one(settings):
     made = sinew.DeltaMush(2 * SHEET, **FACES, **settings)
     np.testing.assert_array_equal(mush.apply(SHEET[::-1]), made.apply(SHEET[::-1]))
     assert repr(mush) == repr(made) == f"<sinew.DeltaMush: 4 vertices, {made.iterations} iterations>"
+
+
+@pytest.mark.parametrize("scale", [np.nan, np.inf])
+def test_a_scale_that_is_not_finite_is_refused(scale):
+    with pytest.raises(ValueError, match="scale: expected a finite number"):
+        sinew.DeltaMush(SHEET, **FACES).apply(SHEET, scale=scale)
