@@ -28,11 +28,13 @@ CLOTHES = {
 }
 SKIN = (0.80, 0.56, 0.44, 1.0)
 VIEW, ADD, METHOD = (400, 500), (880, 125), (930, 128)
-STAGES, MESHES = (790, 184), (790, 211)
+STAGES, MESHES = (790, 204), (790, 231)
 # Panels' headers while all are closed.
 HEADERS = {
     name: (850, 97 + 28 * number)
-    for number, name in enumerate(("Sinew", "Suggest", "Flex", "Heat Map", "Diagnostics"))
+    for number, name in enumerate(
+        ("Sinew", "Variants", "Suggest", "Range of Motion", "Flex", "Heat Map", "Diagnostics")
+    )
 }
 
 
