@@ -516,8 +516,14 @@ def findings(words: list[str]) -> int:
         sys.exit(f"dev: no finding {unknown[0]}: {', '.join(known)}")
     pythons = [Path(python).parent for python in map(python_of, WHEEL_PYTHONS) if python]
     os.environ["PATH"] = ":".join(map(str, (*pythons, os.environ["PATH"])))
-    changed = [name for name in words or known if say(f"finding {name}") or call("bash", known[name])]
-    return 1 if changed and not say(f"changed: {', '.join(changed)}") else 0
+    changed = []
+    for name in words or known:
+        say(f"finding {name}")
+        if call("bash", known[name]):
+            changed.append(name)
+    if changed:
+        say(f"changed: {', '.join(changed)}")
+    return 1 if changed else 0
 
 
 def players(words: list[str]) -> int:

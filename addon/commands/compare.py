@@ -4,8 +4,9 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Generator
+from collections.abc import Sequence
 from pathlib import Path
+from types import MappingProxyType
 from typing import TYPE_CHECKING
 
 from ..base.errors import SinewError, WrongUse
@@ -34,7 +35,10 @@ from .arguments import (
 from .console import Console
 
 if TYPE_CHECKING:
+    import bpy
+
     from ..features.measure.subjects import Subject
+    from ..features.pages.viewer import Variants
 
 
 SHEET = f"blender, {USUAL}, recommended"
@@ -218,7 +222,6 @@ def _write_viewer(path: Path, methods: list[str], args: argparse.Namespace, cons
 
     console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
-    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
     # The painted mix is that of the file.
     own = {obj: properties.of(obj).method for obj in scene.objects if properties.has_sinew(obj)}
     meshes, left_out = characters.deformable_meshes(scene, path, [*methods, viewer.PLAYED], args.object)
@@ -231,10 +234,7 @@ def _write_viewer(path: Path, methods: list[str], args: argparse.Namespace, cons
     methods = list(
         dict.fromkeys(each for name in methods for each in (chosen if name in PRESETS else [name]))
     )
-    attached = viewer.attached_to(scene, meshes)
-    of_each = dict.fromkeys(meshes, ())
-    steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out)
-    return _write_page(path, steps, len(frames), left_out, args.viewer, console)
+    return _write_page(path, meshes, methods, left_out, args, console)
 
 
 def _write_viewer_of_variants(
@@ -249,7 +249,6 @@ def _write_viewer_of_variants(
 
     console.note_on(path, files.open_file(path))
     scene = bpy.context.scene
-    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
     found = characters.deformed_meshes_of(scene, path, args.object)
     own = {each: characters.own_variants(found, each) for each in args.variants}
     meshes, left_out = characters.taken(found, path, [viewer.PLAYED])
@@ -258,27 +257,34 @@ def _write_viewer_of_variants(
         for each, variants in own.items()
     }
     console.note_on(path, characters.sentences())
-    attached = viewer.attached_to(scene, meshes)
-    of_each = dict.fromkeys(meshes, ())
-    steps = viewer.page(scene, path.stem, of_each, attached, list(rows), frames, left_out, variants=rows)
-    return _write_page(path, steps, len(frames), left_out, args.viewer, console)
+    return _write_page(path, meshes, list(rows), left_out, args, console, rows)
 
 
 def _write_page(
     path: Path,
-    steps: Generator[float, None, str],
-    count: int,
+    meshes: Sequence[bpy.types.Object],
+    methods: list[str],
     left_out: list[str],
-    target: Path,
+    args: argparse.Namespace,
     console: Console,
+    variants: Variants = MappingProxyType({}),
 ) -> bool:
-    """Returns False where a mesh was left out."""
-    with console.bar(f"Reading {path.name}", count) as show:
+    """Of the open file; variants as of viewer.page(). Returns False where a mesh was left out."""
+    import bpy
+
+    from ..features.pages import viewer
+
+    scene = bpy.context.scene
+    frames = args.frames or list(range(scene.frame_start, scene.frame_end + 1))
+    attached = viewer.attached_to(scene, meshes)
+    of_each = dict.fromkeys(meshes, ())
+    steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out, variants=variants)
+    with console.bar(f"Reading {path.name}", len(frames)) as show:
         text = result_of(steps, show)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
-    write_text(target, text)
-    console.say(str(target))
+    write_text(args.viewer, text)
+    console.say(str(args.viewer))
     return not left_out
 
 

@@ -51,6 +51,11 @@ class Check:
     suspect: bool = False
     stale: bool = False
 
+    @property
+    def known(self) -> dict[str, Finding]:
+        """All that can be shown and mended, by their keys."""
+        return {**{finding.key: finding for finding in self.findings}, **self.places}
+
 
 # How far the view is from a place, in sizes of the mesh.
 NEAR = 0.3
@@ -107,7 +112,7 @@ def check_again(scene: bpy.types.Scene, obj: bpy.types.Object, most_influences: 
 def has(obj: bpy.types.Object, key: str) -> bool:
     """Whether this fault is known, and can be shown and mended."""
     found = of(obj)
-    return found is not None and (key in found.places or any(each.key == key for each in found.findings))
+    return found is not None and key in found.known
 
 
 def keep_places(obj: bpy.types.Object, places: Sequence[Finding]) -> None:
@@ -122,8 +127,7 @@ def forget_place(obj: bpy.types.Object, key: str) -> None:
 def finding_of(obj: bpy.types.Object, key: str) -> tuple[Check, Finding]:
     """Raises SinewError where no such fault is known, or the mesh now has other vertices."""
     found = of(obj)
-    known = {**{f.key: f for f in found.findings}, **found.places} if found is not None else {}
-    finding = known.get(key)
+    finding = found.known.get(key) if found is not None else None
     if finding is None:
         raise SinewError(f"{obj.name}: no such fault is known; press Check again")
     if len(found.weights.counts) != _vertex_count(obj):
@@ -163,7 +167,7 @@ def select_vertices(
 
 
 def _look_at(context: bpy.types.Context, obj: bpy.types.Object, vertices: np.ndarray) -> None:
-    """Blender's own operator would not come nearer to a single vertex, and follows the pose in no mode."""
+    """By hand: Blender's View Selected comes no nearer to a single vertex."""
     points = transformed(mesh_io.read_points(obj.data)[vertices], np.array(obj.matrix_world))
     size = max(NEAR * max(obj.dimensions), 2.0 * float(np.linalg.norm(np.ptp(points, axis=0))))
     for area in context.screen.areas if context.screen is not None else ():

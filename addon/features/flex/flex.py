@@ -22,7 +22,7 @@ from ..measure.limits import Table
 from ..measure.measured_on import OWN as OWN_METHOD
 from ..measure.measured_on import MeasuredOn
 from ..measure.metrics import FrameOfRig
-from ..measure.rigs import Rig, posed, skeleton_of
+from ..measure.rigs import Rig, posed, rig_in, skeleton_of
 from .verdict import OWN, Pose, Verdict, judge
 
 
@@ -97,18 +97,11 @@ def flex(
 
 def _rigs(now: live.Moment) -> list[Rig]:
     found: dict[int, Rig] = {}
-    first = 0
     for part, world in zip(now.subject.parts, now.armatures, strict=True):
         armature, deformer = properties.of(part.obj).armature, part.bound.first_deformer
         if armature is None:
             raise SinewError(f"{part.obj.name}: its armature is missing")
-        if armature.session_uid not in found:
-            found[armature.session_uid] = Rig(armature, deformer.bones, world, first=first)
-            first += len(deformer.bones.names)
-        else:
-            rig = found[armature.session_uid]
-            rig.bones = rig.bones.with_skin_of(deformer.bones)
-        found[armature.session_uid].moving.update(deformer.moving_bones)
+        rig_in(found, armature, deformer.bones, world).moving.update(deformer.moving_bones)
     return list(found.values())
 
 

@@ -11,7 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
-from ..measure.character import Character, Place
+from ..measure.character import SAME_PATCH, Character, Place, share_in
 from ..measure.limits import Limit
 from ..measure.metrics import FrameOfRig
 from ..measure.weight_check import WeightCheck
@@ -28,8 +28,8 @@ _OF_WEIGHTS = ("bleed", "astray", "other_side", "asymmetry")
 _OF_LIMBS = ("volume_loss", "volume_gain", "radius")
 # A fault's place is at a patch, also, so many edges beside it.
 _RINGS = 2
-# This part of a fault's vertices is in a patch, or this part of a limb, where it comes from there.
-_SAME_PATCH, _OF_LIMB = 1.0 / 3.0, 0.02
+# A limb's fault comes from a patch that has this part of the limb.
+_OF_LIMB = 0.02
 
 
 class Posed(Protocol):
@@ -322,9 +322,9 @@ class _Judging:
         if name == "pivot":
             return is_own and not self._limits[name].is_beyond(self._region(bone)[0].pivot(around))
         if name in _OF_WEIGHTS:
-            return (is_own or name == "asymmetry") and _share(around, worst.vertices) >= _SAME_PATCH
+            return (is_own or name == "asymmetry") and share_in(around, worst.vertices) >= SAME_PATCH
         if name in _OF_LIMBS:
-            return _share(around, self._region(bone)[0].vertices) > (0.0 if is_own else _OF_LIMB)
+            return share_in(around, self._region(bone)[0].vertices) > (0.0 if is_own else _OF_LIMB)
         return is_posed and worst.place is not None and bool(around[worst.place.vertex])
 
     def _finding(self, bone: int, name: str, worst: _Worst) -> Finding:
@@ -361,8 +361,3 @@ class _Judging:
         sign = -1.0 if self._limits[name].least else 1.0
         if known is None or sign * worst.value > sign * known.value:
             self._worst[bone, method, name] = worst
-
-
-def _share(chosen: np.ndarray, vertices: np.ndarray) -> float:
-    """Of the vertices int [n], the part that is in `chosen`, bool."""
-    return float(chosen[vertices].mean()) if len(vertices) else 0.0

@@ -14,6 +14,9 @@ from ...skinning.surface import Surface
 from ...skinning.vectors import distances_from_axes
 from .metrics import Shape
 
+SAME_PATCH = 1.0 / 3.0
+"""Faults are of one place where this part of one's vertices is in the other."""
+
 
 @dataclass(frozen=True)
 class Place:
@@ -169,3 +172,8 @@ class Character:
                 return name, vertex
             vertex -= count
         raise IndexError(vertex)
+
+
+def share_in(chosen: np.ndarray, vertices: np.ndarray) -> float:
+    """Of the vertices int [n], the part that is in `chosen`, bool; 0 of none."""
+    return float(chosen[vertices].mean()) if len(vertices) else 0.0

@@ -71,6 +71,17 @@ def skeleton_of(rigs: Sequence[Rig]) -> Skeleton:
     return Skeleton(tuple(names), rest, tails, above, deform, tuple(roles), side, mirror, rig_of, rig_names)
 
 
+def rig_in(found: dict[int, Rig], armature: bpy.types.Object, bones: Bones, world: np.ndarray) -> Rig:
+    """Returns the armature's rig of `found`, made there if need be, with the skin of these bones too."""
+    rig = found.get(armature.session_uid)
+    if rig is None:
+        first = sum(len(each.bones.names) for each in found.values())
+        rig = found[armature.session_uid] = Rig(armature, bones, world, first=first)
+    else:
+        rig.bones = rig.bones.with_skin_of(bones)
+    return rig
+
+
 def rigs_of(now: Moment) -> list[Rig]:
     found: dict[int, Rig] = {}
     for part in now.subject.parts:
@@ -78,13 +89,9 @@ def rigs_of(now: Moment) -> list[Rig]:
         for skin, (_modifier, replaced) in zip(part.skin_stack.skins, pairs, strict=False):
             if replaced.armature is None:
                 continue
-            bones, known = skin.deformer.bones, found.get(replaced.armature.session_uid)
-            if known is None:
-                world = np.array(replaced.armature.matrix_world)
-                known = found[replaced.armature.session_uid] = Rig(replaced.armature, bones, world)
-            else:
-                known.bones = known.bones.with_skin_of(bones)
-            known.moving.update(skin.deformer.moving_bones)
+            world = np.array(replaced.armature.matrix_world)
+            rig = rig_in(found, replaced.armature, skin.deformer.bones, world)
+            rig.moving.update(skin.deformer.moving_bones)
     return list(found.values())
 
 

@@ -12,15 +12,12 @@ from ...io import mesh_io
 from ...skinning.influences import joined as influences_of_all
 from ...skinning.surface import joined
 from ...skinning.vectors import transformed
-from .character import Character
+from .character import SAME_PATCH, Character, share_in
 from .diagnostics import Finding
 from .limits import LIMITS
-from .rigs import Rig, skeleton_of
+from .rigs import Rig, rig_in, skeleton_of
 from .subjects import Edited
 from .weight_check import WeightCheck
-
-# A patch of which so much is in one that was found before is the same.
-_SAME = 1.0 / 3.0
 
 
 def stray_weights(meshes: Sequence[Edited]) -> list[list[Finding]]:
@@ -34,7 +31,7 @@ def stray_weights(meshes: Sequence[Edited]) -> list[list[Finding]]:
     numbers = {mesh.obj.name: number for number, mesh in enumerate(meshes)}
     for value in WeightCheck(character).stray():
         limit, own = LIMITS[value.name], known[value.bone]
-        if not limit.is_beyond(value.value) or own[value.vertices].mean() >= _SAME:
+        if not limit.is_beyond(value.value) or share_in(own, value.vertices) >= SAME_PATCH:
             continue
         own[value.vertices] = True
         bone = character.skeleton.names[value.bone]
@@ -46,18 +43,10 @@ def stray_weights(meshes: Sequence[Edited]) -> list[list[Finding]]:
 
 def _character(meshes: Sequence[Edited]) -> Character:
     rigs: dict[int, Rig] = {}
-    first = 0
+    own = []
     for mesh in meshes:
-        armature, bones = attach.armature_of(mesh.obj), mesh.weighting.bones
-        rig = rigs.get(armature.session_uid)
-        if rig is None:
-            rig = rigs[armature.session_uid] = Rig(
-                armature, bones, np.array(armature.matrix_world), first=first
-            )
-            first += len(bones.names)
-        else:
-            rig.bones = rig.bones.with_skin_of(bones)
-    own = [rigs[attach.armature_of(mesh.obj).session_uid] for mesh in meshes]
+        armature = attach.armature_of(mesh.obj)
+        own.append(rig_in(rigs, armature, mesh.weighting.bones, np.array(armature.matrix_world)))
     influences = [mesh.weighting.influences_over_joints(mesh.rest_points) for mesh in meshes]
     return Character(
         joined([mesh_io.read_surface(mesh.obj.data) for mesh in meshes]),
