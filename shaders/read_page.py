@@ -52,10 +52,11 @@ def points(about, arrays, method, frame):
         (by.twist, by.bulge), by.form = np.clip(arrays["masks"] * look["strengths"], 0, 1).T, look["form"]
     if is_mixed:
         by.share = arrays["shares"].astype(np.float64)
+    recorded = arrays[look["recorded"]][frame].T * look["step"] if look["recorded"] else 0.0
     rest, palette = arrays["rest"].astype(np.float64), arrays["palettes"][frame]
     if "moving" in arrays:
         rest[arrays["moving"]] = arrays["moved"][frame]
     if not len(arrays["bones"]):
-        return rest
+        return rest + recorded
     found = deformed(by, rest, arrays.get("centres"), bones, weights, palette)
-    return np.where(still[:, None], rest, found)
+    return np.where(still[:, None], rest, found) + recorded

@@ -11,12 +11,13 @@ from types import MappingProxyType
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, stage_settings, upstream_proxy
+from ...attach import attach, properties, stage_settings, upstream_proxy, variant_settings
 from ...attach.layout import method_of
 from ...base.errors import SinewError
 from ...deform import characters, session, source
 from ...deform.bound import Bound
 from ...deform.pose import stage_values
+from ...deform.skinned_object import SkinnedObject
 from ...io import armature_io, mesh_io, spaces
 from ...skinning.bulge_limit import segments
 from ...skinning.influences import Influences
@@ -26,7 +27,7 @@ from ...skinning.twist_spread import NOT_TOLD, TwistInputs
 from ...skinning.variants import Variant, is_key, parse
 from ...skinning.vectors import transformed
 from ...skinning.vertex_data import VertexData
-from ..measure import battery
+from ..measure import battery, live
 from .viewer_page import BLENDER, METHODS, MIX, Form, Found, Look, Part, Stages, Viewer
 
 # The method of meshes that have none of their own; any of Sinew's would do.
@@ -34,13 +35,14 @@ PLAYED = "dq"
 POSES_A_SECOND = 1.0
 # The stages that the shaders have, each with the parameter of its strength.
 STRENGTHS = {"twist_spread": "amount", "bulge_limit": "strength"}
+SMOOTHING = "delta_mush"
 
 Variants = Mapping[str, Mapping[bpy.types.Object, Variant]]
 """By keys of variants, what each is for objects for which it is not what the key says."""
 NOTES = (
     "The browser skins the meshes by the shaders that Sinew has for engines: Linear Blend, Dual Quaternion, "
-    "Centres of Rotation and the painted mix of two, Twist Spread and Limit Bulge. For other methods and for "
-    "Delta Mush, compare in Blender.",
+    "Centres of Rotation and the painted mix of two, Twist Spread and Limit Bulge. Shapes of other methods and "
+    "of Delta Mush are recorded in each frame.",
     "Shapes are those right after the skinning, without the modifiers behind it.",
 )
 
@@ -74,24 +76,28 @@ class _Skinned:
     space     from its object space to that of the armature, of the first frame
 
     follows_turns  Twist Spread's setting
+    variants       by their keys, and that of its own mix by MIX
+    recorded       the names whose shapes the shaders lack
     """
 
     obj: bpy.types.Object
     armature: bpy.types.Object
-    bound: Bound
+    skinned: SkinnedObject
     rest: np.ndarray
     space: np.ndarray
     part: Part
     follows_turns: bool
+    variants: Mapping[str, Variant]
+    recorded: Sequence[str]
     has_moved: bool = False
     has_shifted: bool = False
 
     def add_frame(self, depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
-        armature, bones = self.armature.evaluated_get(depsgraph), self.bound.first_deformer.bones
+        armature, bones = self.armature.evaluated_get(depsgraph), self.skinned.bound.first_deformer.bones
         posed = chosen.of(self.armature, bones) if chosen else armature_io.read_pose(armature, bones)
         if not np.isfinite(posed).all():
             raise SinewError(f"{self.part.name}: the pose of a bone is not finite")
-        points = source.rest_points(self.obj, self.bound.source, depsgraph)
+        points = source.rest_points(self.obj, self.skinned.bound.source, depsgraph)
         rest = None
         if not np.array_equal(points, self.rest):
             self.has_moved, rest = True, transformed(points, self.space).astype(np.float32)
@@ -106,15 +112,23 @@ class _Skinned:
         self.part.add_frame(posed, np.array(armature.matrix_world), rest, twists, turns)
 
     @property
+    def rigs(self) -> list[tuple[Bones, bpy.types.Object]]:
+        """The bones of each Armature modifier, with its armature."""
+        pairs = attach.replaced_modifiers(self.obj)
+        skins = self.skinned.bound.skin_stack.skins
+        return [
+            (skin.deformer.bones, replaced.armature)
+            for skin, (_modifier, replaced) in zip(skins, pairs, strict=False)
+        ]
+
+    @property
     def notes(self) -> list[str]:
         """What the page has of it otherwise than Blender."""
         name, found = self.part.name, []
-        if self.has_moved and self.bound.first_deformer.weighting.depends_on_points:
+        if self.has_moved and self.skinned.bound.first_deformer.weighting.depends_on_points:
             found.append(f"{name}: weights of envelopes and bendy bones stay as in the first frame.")
         if self.has_shifted:
             found.append(f"{name}: it moves against its armature, and stays as in the first frame here.")
-        if stage_settings.is_on(properties.of(self.obj), "delta_mush"):
-            found.append(f"{name}: shown without Delta Mush.")
         return found
 
 
@@ -171,50 +185,32 @@ def page(
 
     meshes    each with the objects that Sinew may deform in its place
     attached  meshes that bones move as they are
-    methods   those to choose from, or keys of variants; the shaders lack some, which the page says
+    methods   those to choose from, or keys of variants; shapes that the shaders lack are recorded
     frames    of the scene, or poses beside the one that it has
     left_out  sentences on other meshes
     found     what Flex found in these poses
 
-    Raises SinewError where no mesh or method can be shown.
+    Raises SinewError where no mesh can be shown.
     """
     own: dict[bpy.types.Object, dict[str, Variant]] = {
         obj: {name: variants.get(name, {}).get(obj) or parse(name) for name in filter(is_key, methods)}
         for obj in meshes
     }
-    shown = [
-        name
-        for name in methods
-        if name in (*METHODS, BLENDER) or (is_key(name) and all(_has_look(own[obj][name]) for obj in meshes))
-    ]
-    if not shown:
-        raise SinewError(f"the page has {', '.join(METHODS)} and blender: choose one of them")
     if not isinstance(frames[0], Pose):
         characters.set_frame(scene, frames[0])
     skinned: list[_Skinned] = []
     notes = [*NOTES, *left_out]
     for obj, others in meshes.items():
         try:
-            looks = {name: variant for name, variant in own[obj].items() if name in shown}
-            skinned.append(_read(obj, [obj, *others], shown, looks))
+            skinned.append(_read(obj, [obj, *others], methods, own[obj]))
         except SinewError as error:
             notes.append(f"{obj.name}: left out: {error}")
     if not skinned:
         raise SinewError("; ".join(notes[len(NOTES) :]))
-    labels = {name: _label(name) for name in shown}
+    labels = {name: _label(name) for name in methods}
     # A variant says itself whether it is mixed.
-    if any(each.part.mix is not None for each in skinned) and not all(map(is_key, shown)):
+    if any(each.part.mix is not None for each in skinned) and not all(map(is_key, methods)):
         labels = {MIX: "Painted Mix", **labels} if found else {**labels, MIX: "Painted Mix"}
-    missing = [_label(name) for name in methods if name not in shown]
-    if missing:
-        notes.append(f"Not in this page: {', '.join(missing)}.")
-    smoothed = [
-        _label(name)
-        for name in shown
-        if any("delta_mush" in own[obj][name].stages for obj in own if is_key(name))
-    ]
-    if smoothed:
-        notes.append(f"Shown without Delta Mush: {', '.join(smoothed)}.")
     shown_meshes = [*skinned, *(_read_attached(obj) for obj in attached)]
     rate = POSES_A_SECOND if found else scene.render.fps / scene.render.fps_base
     parts = [each.part for each in shown_meshes]
@@ -226,6 +222,7 @@ def page(
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for each in shown_meshes:
             each.add_frame(depsgraph, pose)
+        _record(skinned, depsgraph, pose)
         viewer.add_frame(frame if pose is None else pose.name)
         yield (number + 1) / len(frames)
     viewer.notes += [note for each in skinned for note in each.notes]
@@ -236,11 +233,13 @@ def _label(name: str) -> str:
     return parse(name).title if is_key(name) else properties.method_label(name)
 
 
-def _has_look(variant: Variant) -> bool:
-    """Whether the shaders have it, but for Delta Mush."""
-    has_rule = variant.settings.get("scale_rule", BLENDER_4.name) == BLENDER_4.name
+def _has_look(variant: Variant, rule: str) -> bool:
+    """Whether the shaders have it, but for Delta Mush. rule: for scale, of the mesh"""
+    has_rule = variant.settings.get("scale_rule", rule) == BLENDER_4.name
     is_mixed = "mix" in variant.stages
-    return has_rule and variant.method in (*METHODS, BLENDER) and (not is_mixed or variant.mix in METHODS)
+    if variant.method == BLENDER:
+        return True
+    return has_rule and variant.method in METHODS and (not is_mixed or variant.mix in METHODS)
 
 
 def _look(variant: Variant) -> Look:
@@ -269,13 +268,6 @@ def _read(
         raise SinewError("Sinew deforms neither it nor a copy of it")
     obj_of_state, state = found[0]
     settings, bound = properties.of(obj_of_state), state.bound
-    skins = bound.skin_stack.skins
-    if len(skins) != 1 or skins[0].mask is not None:
-        raise SinewError("several Armature modifiers deform it, or one with a vertex group")
-    rules = {each.settings.get("scale_rule", settings.scale_rule) for each in variants.values()}
-    rules |= {settings.scale_rule} if set(methods) - {BLENDER, *variants} else set()
-    if rules - {BLENDER_4.name}:
-        raise SinewError(f"its rule for scale is not {BLENDER_4.label}")
     modifier, replaced = attach.replaced_modifiers(obj_of_state)[0]
     armature = replaced.armature
     space = spaces.bones_from_model_in(depsgraph, obj_of_state, armature)
@@ -290,7 +282,8 @@ def _read(
         mesh = upstream_proxy.evaluated_mesh(obj_of_state, depsgraph)
     triangles = mesh_io.read_triangles(mesh)
     mix = _mix_of(obj, bound)
-    looks = {name: _look(variant) for name, variant in variants.items()}
+    rule = settings.scale_rule
+    looks = {name: _look(variant) for name, variant in variants.items() if _has_look(variant, rule)}
     needed = {*methods, *(mix or ()), *(name for look in looks.values() for name in (look.method, look.mix))}
     centres = None
     if "cor" in needed:
@@ -316,12 +309,52 @@ def _read(
         by_hierarchy,
         weighting.bones.twists.parents if has_signs else None,
         _stages_of(settings, bound, len(points), looks.values()),
+        [stage_settings.STAGES[name].label for name in stage_values(settings)],
         np.clip(shares, 0.0, 1.0) if is_mixed else None,
         looks,
     )
+    is_whole = len(bound.skin_stack.skins) == 1 and bound.skin_stack.skins[0].mask is None
+    is_shaded = is_whole and rule == BLENDER_4.name and SMOOTHING not in stage_values(settings)
+
+    def is_recorded(name: str) -> bool:
+        if is_key(name):
+            return not is_whole or name not in looks or SMOOTHING in variants[name].stages
+        return not (is_whole if name == BLENDER else is_shaded and name in (*METHODS, MIX))
+
     return _Skinned(
-        obj_of_state, armature, bound, rest.copy(), space, part, follows_turns=settings.twist_spread.turns
+        obj_of_state,
+        armature,
+        state,
+        rest.copy(),
+        space,
+        part,
+        settings.twist_spread.turns,
+        {**variants, MIX: variant_settings.read(obj)} if mix else variants,
+        [name for name in (*methods, *((MIX,) if mix else ()), BLENDER) if is_recorded(name)],
     )
+
+
+def _record(skinned: Sequence[_Skinned], depsgraph: bpy.types.Depsgraph, chosen: Pose | None) -> None:
+    """Adds shapes that the shaders lack, of the frame that was added last."""
+    names = dict.fromkeys(name for each in skinned for name in each.recorded)
+    if not names:
+        return
+    subject = live.measure([(each.obj, each.skinned) for each in skinned], BLENDER, depsgraph)
+    if subject is None:
+        raise SinewError("Sinew does not deform all meshes of the page")
+    moment = live.Moment.of(subject)
+    if chosen is not None:
+        armatures = {id(bones): armature for each in skinned for bones, armature in each.rigs}
+        moment = moment.posed(lambda bones: chosen.of(armatures[id(bones)], bones))
+    for name in names:
+        if is_key(name) or name == MIX:
+            own = [each.variants.get(name, Variant.of(BLENDER)) for each in skinned]
+            points = moment.points_under(own)
+        else:
+            points = moment.points([name] * len(skinned))
+        for each, shape in zip(skinned, subject.split(points), strict=True):
+            if name in each.recorded:
+                each.part.record(name, shape)
 
 
 def _stages_of(
@@ -338,10 +371,9 @@ def _stages_of(
     masks = [np.broadcast_to(after.masks.get(name, 1.0), vertices) for name in STRENGTHS]
     form = values["bulge_limit"]["form"] if "bulge_limit" in values else "continuous"
     bones = bound.first_deformer.weighting.bones
-    labels = [stage_settings.STAGES[name].label for name in STRENGTHS if name in values]
     look = Look(settings.method, strengths=(of_file[0], of_file[1]), form=form)
     stacked = np.stack(masks, axis=1).astype(np.float32)
-    return Stages(labels, look, stacked, bones.twists, segments(bones))
+    return Stages(look, stacked, bones.twists, segments(bones))
 
 
 def _read_attached(obj: bpy.types.Object) -> _Attached:

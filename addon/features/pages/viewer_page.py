@@ -36,6 +36,9 @@ from .bone_buffer import (
 )
 from .page import legend_texts
 
+# Steps of recorded offsets, as a part of the diagonal at rest; more where 16 bits hold too few of them.
+OFFSET_STEP = 2e-6
+MOST_STEPS = 32767
 # Methods that the shaders have, in the order of the page's lists.
 METHODS = ("lbs", "dq", "cor")
 Form: TypeAlias = Literal["continuous", "kim_han"]
@@ -70,14 +73,12 @@ class Look:
 class Stages:
     """The stages of a mesh after the blend that the shaders have.
 
-    names     of those that are on
     look      of the file: which are on, and how
     masks     float32 [vertices, 2], the weights of the vertex groups of Twist Spread and of Limit Bulge
     twists    of the bones
     segments  float32 [bones, 3] each: heads and tails at rest, armature space
     """
 
-    names: list[str]
     look: Look
     masks: np.ndarray
     twists: Twists
@@ -117,6 +118,7 @@ class Part:
     by_hierarchy  the methods whose signs are from the hierarchy in the file
     parents       int32 [bones], -1 for none; given where there are such methods, or a variant has some
     stages        None without any
+    stage_names   labels of those that are on, in the file
     shares        float32 [vertices], of the second method of a mix; None without a mix
     variants      by their keys
     """
@@ -133,8 +135,10 @@ class Part:
     by_hierarchy: Sequence[str] = ()
     parents: np.ndarray | None = None
     stages: Stages | None = None
+    stage_names: Sequence[str] = ()
     shares: np.ndarray | None = None
     variants: Mapping[str, Look] = field(default_factory=dict)
+    _offsets: dict[str, list[np.ndarray]] = field(default_factory=dict)
     _palettes: list[np.ndarray] = field(default_factory=list)
     _worlds: list[np.ndarray] = field(default_factory=list)
     _rests: list[np.ndarray] = field(default_factory=list)
@@ -237,11 +241,26 @@ class Part:
             add_turns(buffer, of.rows, around, amounts * parts.max(axis=0, initial=0.0), of.parents)
         self._motions, self._inputs = motions, (amounts, curves, channels)
 
+    def record(self, name: str, points: np.ndarray) -> None:
+        """Has a name of the page show a shape that the shaders lack: once for each frame, after it is added.
+
+        points  float64 [vertices, 3], in the world
+        """
+        offsets = transformed(points - self._skinned(name), np.linalg.pinv(_linear(self._worlds[-1])))
+        self._offsets.setdefault(name, []).append(offsets.astype(np.float32))
+
     def world_points(self, name: str) -> np.ndarray:
         """float64 [vertices, 3], of the frame that was added last.
 
-        name  as look() takes it
+        name  as look() takes it, or recorded
         """
+        points = self._skinned(name)
+        if name in self._offsets:
+            points += transformed(self._offsets[name][-1], _linear(self._worlds[-1]))
+        return points
+
+    def _skinned(self, name: str) -> np.ndarray:
+        """As world_points(), without what is recorded."""
         look = self.look(name)
         is_own = look.method != BLENDER
         first = look.method if is_own else self.blender
@@ -279,6 +298,21 @@ class Part:
         """float64 [vertices, 3], where the frame that was added last has the mesh without its bones."""
         return transformed(self._rests[-1], self._worlds[-1])
 
+    def looks(self, names: Iterable[str]) -> dict[str, dict[str, Any]]:
+        """What the header has of each name."""
+        places = {name: f"recorded_{number}" for number, name in enumerate(self._offsets)}
+        return {
+            name: asdict(self.look(name))
+            | ({"recorded": places[name], "step": self._step(name)} if name in places else {"recorded": ""})
+            for name in names
+        }
+
+    def _step(self, name: str) -> float:
+        """Of recorded offsets, in armature space."""
+        most = max(float(np.abs(own).max(initial=0.0)) for own in self._offsets[name])
+        diagonal = float(np.linalg.norm(np.ptp(self.rest, axis=0))) if len(self.rest) else 0.0
+        return max(OFFSET_STEP * diagonal, most / MOST_STEPS) or 1.0
+
     def arrays(self) -> dict[str, np.ndarray]:
         """What the page has of it."""
         found = {
@@ -297,6 +331,10 @@ class Part:
             found["shares"] = self.shares
         if self.stages is not None:
             found["masks"] = self.stages.masks
+        for number, (name, offsets) in enumerate(self._offsets.items()):
+            steps = np.rint(np.array(offsets) / self._step(name)).astype(np.int16)
+            # Axis by axis they compress better.
+            found[f"recorded_{number}"] = steps.transpose(0, 2, 1)
         has_moved = np.zeros(len(self.rest), dtype=bool)
         for rest in self._rests:
             if rest is not self.rest:
@@ -427,8 +465,8 @@ class Viewer:
                 {
                     "name": part.name,
                     "blender": part.blender,
-                    "looks": {name: asdict(part.look(name)) for name in {**self.methods, BLENDER: ""}},
-                    "stages": part.stages.names if part.stages else [],
+                    "looks": part.looks({**self.methods, BLENDER: ""}),
+                    "stages": part.stage_names,
                     "arrays": arrays,
                 }
                 for part, arrays in zip(self.parts, places, strict=True)
@@ -447,6 +485,13 @@ class Viewer:
             "ramp": stops.ravel().tolist(),
             "ticks": legend_texts(scale, self.unit),
         }
+
+
+def _linear(matrix: np.ndarray) -> np.ndarray:
+    """A matrix [4, 4] without its translation."""
+    linear = matrix.copy()
+    linear[:3, 3] = 0.0
+    return linear
 
 
 def _stretches(edges: np.ndarray, points: np.ndarray, rest: np.ndarray) -> np.ndarray:

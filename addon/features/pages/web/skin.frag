@@ -10,6 +10,7 @@ precision highp sampler2D;
 uniform sampler2D rest;        // position, and the share of the second method
 uniform sampler2D centres;
 uniform sampler2D amounts;     // of Twist Spread and Limit Bulge
+uniform sampler2D offsets;     // of a recorded shape
 uniform sampler2D influences;  // bone and weight, SINEW_INFLUENCES for each vertex
 
 out vec4 point;
@@ -34,6 +35,9 @@ void main() {
     float linear_share = sinew_linear_share(METHOD, SECOND_METHOD, at_rest.w);
     moved = sinew_twist_spread(moved, linear_share, amount.x, x, bones, weights);
     moved = sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, bones, weights);
+#endif
+#if RECORDED
+    moved += texelFetch(offsets, place, 0).xyz;
 #endif
     point = vec4(moved, 1.0);
 }

@@ -7,7 +7,8 @@
 @group(0) @binding(2) var<storage, read> centres: array<vec4f>;
 @group(0) @binding(3) var<storage, read> amounts: array<vec2f>;  // of Twist Spread and Limit Bulge
 @group(0) @binding(4) var<storage, read> influences: array<vec2f>;  // bone and weight, SINEW_INFLUENCES for each vertex
-@group(0) @binding(5) var<storage, read_write> result: array<vec4f>;
+@group(0) @binding(5) var<storage, read> offsets: array<vec4f>;  // of a recorded shape
+@group(0) @binding(6) var<storage, read_write> result: array<vec4f>;
 
 @compute @workgroup_size(64)
 fn skin(@builtin(global_invocation_id) id: vec3u) {
@@ -27,5 +28,6 @@ fn skin(@builtin(global_invocation_id) id: vec3u) {
         moved = sinew_twist_spread(moved, sinew_linear_share(METHOD, SECOND_METHOD, share), amount.x, x, own);
         moved = sinew_bulge_limit(moved, BULGE_FORM, amount.y, x, own);
     }
+    if RECORDED == 1u { moved += offsets[vertex].xyz; }
     result[vertex] = vec4f(moved, 1.0);
 }

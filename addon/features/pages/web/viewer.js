@@ -21,7 +21,7 @@ async function readArrays() {
   const packed = Uint8Array.from(atob(find("arrays").textContent), (c) => c.charCodeAt(0));
   const stream = new Blob([packed]).stream().pipeThrough(new DecompressionStream("deflate"));
   const buffer = await new Response(stream).arrayBuffer();
-  const types = { float32: Float32Array, uint16: Uint16Array, uint32: Uint32Array, int32: Int32Array };
+  const types = { float32: Float32Array, uint16: Uint16Array, uint32: Uint32Array, int16: Int16Array, int32: Int32Array };
   return header.parts.map((part) => Object.fromEntries(Object.entries(part.arrays).map(([name, place]) => {
     const count = place.shape.reduce((a, b) => a * b, 1);
     return [name, new types[place.type](buffer, place.offset, count)];
@@ -105,6 +105,8 @@ class Mesh {
     this.centres = way.array("float4", wide(arrays.centres || arrays.rest), this.count);
     this.amounts = new Map();
     this.palette = way.array("float4", arrays.palettes.subarray(0, 4 * BONE * this.bones), BONE * this.bones, BONE);
+    this.offsetRows = new Float32Array(4 * this.count);
+    this.offsets = way.array("float4", this.offsetRows, this.count);
     this.drawAround(arrays.triangles, arrays.edges);
     const target = () => way.array("float4", null, this.count);
     this.panes = [0, 1].map(() => ({ points: target(), surface: target() }));
@@ -149,6 +151,7 @@ class Mesh {
   }
 
   setFrame(index) {
+    this.frame = index;
     const size = 4 * BONE * this.bones;
     this.palette.write(this.arrays.palettes.subarray(index * size, (index + 1) * size));
     if (this.arrays.moving) this.moveRest(index);
@@ -172,15 +175,28 @@ class Mesh {
     return this.amounts.get(key);
   }
 
-  skin(name, most, target) {
-    const { blender, looks } = this.about, { method, mix, by_hierarchy, strengths, form } = looks[name];
+  // Of a shape that the shaders lack: what is to be added to the one that they have.
+  readOffsets({ recorded, step }) {
+    const first = 3 * this.count * this.frame, own = this.arrays[recorded];
+    for (let i = 0; i < 3; ++i) {
+      for (let v = 0; v < this.count; ++v) this.offsetRows[4 * v + i] = step * own[first + i * this.count + v];
+    }
+    this.offsets.write(this.offsetRows);
+  }
+
+  skin(name, limit, target) {
+    const look = this.about.looks[name], { method, mix, by_hierarchy, strengths, form } = look;
+    const { blender } = this.about, hasStages = state.stages || !isStaged(name);
+    const isRecorded = look.recorded && hasStages, most = isRecorded ? Infinity : limit;
+    if (isRecorded) this.readOffsets(look);
     const isOwn = method !== "blender", isMixed = isOwn && mix && this.arrays.shares;
     const [first, second] = (isOwn ? [method, isMixed ? mix : method] : [blender, blender])
       .map((one) => METHODS[one] + (isOwn && by_hierarchy.includes(one) ? HIERARCHY : 0));
     const { number, influences } = this.influences(most), amounts = this.amountsOf(strengths);
-    way.run("skin", target, { sinew_bones: this.palette, rest: this.rest, centres: this.centres, amounts, influences }, {
+    const { palette: sinew_bones, rest, centres, offsets } = this;
+    way.run("skin", target, { sinew_bones, rest, centres, amounts, offsets, influences }, {
       SINEW_INFLUENCES: number, METHOD: first, SECOND_METHOD: second, BULGE_FORM: FORMS[form] ?? 0,
-      STAGES: isOwn && (state.stages || isVariant(name)) && strengths.some((x) => x > 0) && this.arrays.masks ? 1 : 0,
+      STAGES: isOwn && hasStages && strengths.some((x) => x > 0) && this.arrays.masks ? 1 : 0, RECORDED: isRecorded ? 1 : 0,
     });
   }
 
@@ -415,10 +431,12 @@ function changed() {
 
 const methodLabel = (name) => header.methods[name];
 const staged = [...new Set(header.parts.flatMap((part) => part.stages))], stagesLabel = staged.join(" and ");
-// The key of a variant, which has stages of its own.
-const isVariant = (name) => name.includes("=");
-const hasStages = (name) => staged.length && state.stages && name !== "blender" && !isVariant(name);
-const shownLabel = (name) => methodLabel(name) + (hasStages(name) ? ` with ${stagesLabel}` : "");
+// The stages of a variant and of a method that the shaders lack can not be taken off.
+const isStaged = (name) => name in METHODS || name === "mix";
+const hasStages = (name) => staged.length && name !== "blender" && !name.includes("=") && (state.stages || !isStaged(name));
+const hasAllBones = (name) => header.parts.some(({ looks }) => looks[name].recorded) && (state.stages || !isStaged(name));
+const shownLabel = (name) => methodLabel(name) + (hasStages(name) ? ` with ${stagesLabel}` : "")
+  + (state.most < Infinity && hasAllBones(name) ? ", all bones" : "");
 
 function say(text) {
   find("said").textContent = text;
