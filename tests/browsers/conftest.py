@@ -79,9 +79,10 @@ def bent(tmp_path_factory):
 
 @pytest.fixture(scope="session")
 def varied(tmp_path_factory):
-    """A page of variants that differ in stages, by their keys."""
+    """A page of variants that differ in stages, by their keys; the last two are recorded."""
     page = tmp_path_factory.mktemp("variants") / "wrist.html"
     keys = "=blender", "Soft=dq+twist_spread:amount=0.8", "=dq:signs=hierarchy+bulge_limit", "=lbs"
+    keys += "=dq+twist_spread+delta_mush", "=qv"
     source = REPOSITORY / "blend_files/wrist.blend"
     sinew("compare", source, "--variants", ",".join(keys), "--frames", "1,12,24", "--viewer", page)
     return page, keys

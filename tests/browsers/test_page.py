@@ -179,13 +179,19 @@ def test_variants_have_stages_of_their_own(browser, varied):
         found = points(browser, 0, f"'{key}'", 2)
         assert np.abs(found - expected).max() <= 1e-5 * np.linalg.norm(np.ptp(expected, axis=0)), key
         shapes.append(found)
-    assert all(np.abs(a - b).max() > 1e-3 for a, b in itertools.combinations(shapes[:3], 2))
+    assert all(np.abs(a - b).max() > 1e-3 for a, b in itertools.combinations([*shapes[:3], shapes[4]], 2))
     assert browser.run("return document.getElementById('stages-set').hidden")
     labels = "return [...document.getElementById('method-0').options].map((one) => one.textContent)"
     assert browser.run(labels)[1:3] == [
         "Soft: Dual Quaternion with Twist Spread",
         "Dual Quaternion with Limit Bulge",
     ]
+    # What is recorded has all bones.
+    browser.run(f"window.sinew.set({{ frame: 2, panes: 2, methods: ['{keys[4]}', '{keys[3]}'], most: 1 }})")
+    panes = "return ['pane-0', 'pane-1'].map((id) => document.getElementById(id).textContent)"
+    assert browser.run(panes) == ["Dual Quaternion with Twist Spread and Delta Mush, all bones", "Linear Blend"]
+    assert np.array_equal(points(browser, 0, f"'{keys[4]}'", 2, 1), shapes[4])
+    assert np.abs(points(browser, 0, f"'{keys[3]}'", 2, 1) - shapes[3]).max() > 1e-3
 
 
 def test_a_wipe_shows_two_over_each_other(browser, varied):
