@@ -189,7 +189,10 @@ def test_variants_have_stages_of_their_own(browser, varied):
     # What is recorded has all bones.
     browser.run(f"window.sinew.set({{ frame: 2, panes: 2, methods: ['{keys[4]}', '{keys[3]}'], most: 1 }})")
     panes = "return ['pane-0', 'pane-1'].map((id) => document.getElementById(id).textContent)"
-    assert browser.run(panes) == ["Dual Quaternion with Twist Spread and Delta Mush, all bones", "Linear Blend"]
+    assert browser.run(panes) == [
+        "Dual Quaternion with Twist Spread and Delta Mush, all bones",
+        "Linear Blend",
+    ]
     assert np.array_equal(points(browser, 0, f"'{keys[4]}'", 2, 1), shapes[4])
     assert np.abs(points(browser, 0, f"'{keys[3]}'", 2, 1) - shapes[3]).max() > 1e-3
 

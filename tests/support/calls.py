@@ -171,7 +171,7 @@ MORE = {
         "sharp_faces": [1, 0],
         "custom_normals": np.ones((6, 2), np.int16),
     },
-    "crossing_triangles": {"threads": 2},
+    "crossing_triangles": {"groups": [0, -1], "threads": 2},
     "compute": {"domain": "vertex", "out": np.zeros((4, 3), np.float32), "threads": 2},
     "SkinnedNormals": {"tangents": POINTS, "vertices": [1, 0], "method": "dq", "mix": ("lbs", HALF)},
     "deform_skinned": OF_POSE,

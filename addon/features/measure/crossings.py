@@ -13,17 +13,21 @@ from .metrics import Shape
 MOST_FRAMES = 8
 
 
-def crossing_triangles(points: np.ndarray, triangles: np.ndarray) -> set[tuple[int, int]]:
+def crossing_triangles(
+    points: np.ndarray, triangles: np.ndarray, groups: np.ndarray | None = None
+) -> set[tuple[int, int]]:
     """Returns pairs of triangles that cross and share no vertex, the lower index first.
 
     points     [vertices, 3]
     triangles  int [triangles, 3]
+    groups     int32 [triangles]: two of one group do not count; below 0: of none
     """
-    return set(map(tuple, sinew.crossing_triangles(points, triangles).tolist()))
+    return set(map(tuple, sinew.crossing_triangles(points, triangles, groups).tolist()))
 
 
-def crossings(shape: Shape) -> set[tuple[int, int]]:
-    return crossing_triangles(shape.points.T, shape.surface.triangles)
+def crossings(shape: Shape, groups: np.ndarray | None = None) -> set[tuple[int, int]]:
+    """groups: as of crossing_triangles()"""
+    return crossing_triangles(shape.points.T, shape.surface.triangles, groups)
 
 
 def frames_to_count(frames: Sequence[float]) -> set[float]:

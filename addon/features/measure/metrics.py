@@ -257,6 +257,13 @@ class Skin:
         return np.sort(self.limb_of_vertices[self.surface.triangles], axis=1)[:, 1]
 
     @cached_property
+    def sole_bones(self) -> np.ndarray:
+        """int32 [triangles]: the bone that alone moves all corners of each; -1 for none."""
+        sole = np.where(self.influences.counts == 1, self.limb_of_vertices, -1).astype(np.int32)
+        of_corners = sole[self.surface.triangles]
+        return np.where((of_corners == of_corners[:, :1]).all(axis=1), of_corners[:, 0], np.int32(-1))
+
+    @cached_property
     def rings(self) -> tuple[np.ndarray, np.ndarray]:
         """The rings of vertices around joints that two bones share alike.
 

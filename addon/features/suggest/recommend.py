@@ -58,16 +58,20 @@ class Judged(NamedTuple):
 
 
 def search(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str = OVER
+    scene: bpy.types.Scene,
+    objects: Sequence[bpy.types.Object],
+    over: str = OVER,
+    read: dict[float, live.Moment] | None = None,
 ) -> Generator[float, None, Choice]:
     """Yields the progress; returns the choice. Objects, actions and the scene's frame are as before.
 
     over  the frames, as for stepped.frames_over()
+    read  gets the frames that were looked at
 
     Raises SinewError where an object cannot be measured.
     """
     check_measurable(objects)
-    named = yield from _in_frames(scene, objects, over)
+    named = yield from _in_frames(scene, objects, over, {} if read is None else read)
     if not named:
         now = live.measure_now(objects, properties.BLENDER, "measure")
         named = _in_battery(live.Moment.of(now))
@@ -117,29 +121,34 @@ def _in_battery(now: live.Moment) -> list[tuple[str, live.Moment]]:
 
 
 def _in_frames(
-    scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str
+    scene: bpy.types.Scene,
+    objects: Sequence[bpy.types.Object],
+    over: str,
+    read: dict[float, live.Moment],
 ) -> Generator[float, None, list[tuple[str, live.Moment]]]:
-    """Returns the frames in which joints bend most; none without an action, or where none bends by much."""
+    """Returns the frames in which joints bend most; none without an action, or where none bends by much. `read`
+    gets all that were looked at."""
     armatures = armatures_of(objects)
     try:
         frames = stepped.frames_over(scene, armatures, over)
     except SinewError:
         return []
     places = np.linspace(0, len(frames) - 1, min(len(frames), LOOKED_AT)).round().astype(int)
-    moments, angles = [], []
+    angles = []
     with stepped.kept_frame(scene, armatures):
         for place in places:
             moment = live.Moment.of(measure_at(scene, objects, properties.BLENDER, frames[place]))
-            moments.append((phrase("frame {frame}", frame=frames[place]), moment))
+            read[frames[place]] = moment
             angles.append(_angles(moment))
-            yield LOOKING * len(moments) / len(places)
+            yield LOOKING * len(angles) / len(places)
     of_bones = np.array(angles)
     chosen: list[int] = []
     for bone in np.argsort(-of_bones.max(axis=0)):
         frame = int(of_bones[:, bone].argmax())
         if of_bones[frame, bone] >= BENDS and frame not in chosen and len(chosen) < MEASURED:
             chosen.append(frame)
-    return [moments[frame] for frame in sorted(chosen)]
+    taken = [frames[places[number]] for number in sorted(chosen)]
+    return [(phrase("frame {frame}", frame=frame), read[frame]) for frame in taken]
 
 
 def _angles(moment: live.Moment) -> np.ndarray:

@@ -24,6 +24,8 @@ RECOMMENDED = "recommended"
 """In Suggestion.methods: the recommended method with its stages, where it has any."""
 # The share of the time that the choice takes.
 CHOOSING = 0.5
+# How far apart methods may take a vertex of one bone, as a part of the diagonal: rounding.
+MOVED_ALIKE = 1e-5
 
 
 class Known(NamedTuple):
@@ -51,7 +53,8 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     frames = stepped.frames_over(scene, armatures, over)
     check_measurable(objects)
     of_choice, basis = (MeasuredOn.of(scene, objects, depth, over) for depth in (CHOICE, STAGES))
-    choice = yield from as_part(recommend.search(scene, objects, over), 0.0, CHOOSING)
+    read: dict[float, live.Moment] = {}
+    choice = yield from as_part(recommend.search(scene, objects, over, read), 0.0, CHOOSING)
     # The panel shows it while the rest is measured.
     recommend.keep(scene, choice, of_choice)
     drop_old(scene, objects)
@@ -64,17 +67,21 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     rest, at_rest = None, set()
     with stepped.kept_frame(scene, armatures):
         for count, frame in enumerate(frames):
-            subject = measure_at(scene, objects, properties.BLENDER, frame)
+            # None stays longer than it is needed: it keeps what is measured of it.
+            moment = read.pop(frame, None) or live.Moment.of(
+                measure_at(scene, objects, properties.BLENDER, frame)
+            )
             # Shape keys change it, and nothing else.
-            if frame in counted and (rest is None or not np.array_equal(rest, subject.gauge.rest.points)):
-                rest, at_rest = subject.gauge.rest.points.copy(), crossings(subject.gauge.rest)
-            suggestion.diagonal = subject.measured.rest.diagonal
-            moment = live.Moment.of(subject)
+            if frame in counted and (rest is None or not np.array_equal(rest, moment.pose.rest.points)):
+                rest, at_rest = moment.pose.rest.points, crossings(moment.pose.rest)
+            suggestion.diagonal = moment.pose.rest.diagonal
+            first = None
             for number, method in enumerate(suggestion.methods, start=1):
                 measured = _measured(method, moment, choice)
+                first = first or measured
                 _add(suggestion, method, frame, measured, choice)
                 if frame in counted:
-                    new = len(crossings(measured.shape) - at_rest)
+                    new = len(crossings(measured.shape, _moved_alike(moment, first, measured)) - at_rest)
                     suggestion.add(method, "crossings", new, frame)
                 done = count + number / len(suggestion.methods)
                 yield CHOOSING + (1.0 - CHOOSING) * done / len(frames)
@@ -99,6 +106,21 @@ def _measured(method: str, moment: live.Moment, choice: Choice) -> Measured:
     if method == RECOMMENDED:
         return moment.measured(choice.variant.method, choice.variant.stage_values)
     return moment.measured(method)
+
+
+def _moved_alike(moment: live.Moment, first: Measured, measured: Measured) -> np.ndarray | None:
+    """Triangles that a bone moves as a whole, as groups of crossings(): they cross as they do at rest. None where
+    stages or neighbours move vertices otherwise.
+
+    first  the shape of the linear blend
+    """
+    if any(own.stages or len(own.frames) > 1 for own in moment.inputs):
+        return None
+    bones, surface = moment.pose.skin.sole_bones, measured.shape.surface
+    vertices = np.unique(surface.triangles[bones >= 0])
+    apart = (measured.shape.points - first.shape.points)[:, vertices]
+    is_alike = np.abs(apart).max(initial=0.0) <= MOVED_ALIKE * moment.pose.rest.diagonal
+    return bones if is_alike else None
 
 
 def _add(suggestion: Suggestion, method: str, frame: float, measured: Measured, choice: Choice) -> None:

@@ -2,6 +2,7 @@
 #include "sinew/mesh/crossings.h"
 
 #include <algorithm>
+#include <cmath>
 #include <glm/geometric.hpp>
 #include <limits>
 #include <utility>
@@ -15,30 +16,58 @@ using Point = Vec3<double>;
 using Corners = std::array<std::int32_t, 3>;
 using Triangle = std::array<Point, 3>;
 
+constexpr float kInfinity = std::numeric_limits<float>::infinity();
+
 struct Box {
-    Point low, high;
+    Vec3<float> low, high;
 };
 
+/// Without branches: which of the comparisons fails can not be predicted.
 bool meet(const Box& a, const Box& b) noexcept {
-    return glm::all(glm::lessThanEqual(a.low, b.high)) && glm::all(glm::lessThanEqual(b.low, a.high));
+    const auto apart = [&](int axis) { return (a.low[axis] > b.high[axis]) | (b.low[axis] > a.high[axis]); };
+    return !(apart(0) | apart(1) | apart(2));
 }
 
 Box around(const Box& a, const Box& b) noexcept { return {glm::min(a.low, b.low), glm::max(a.high, b.high)}; }
 
+/// A box of floats that contains the points.
+Box box_around(const Triangle& points) noexcept {
+    Box box;
+    for (int axis = 0; axis < 3; ++axis) {
+        const auto [low, high] = std::minmax({points[0][axis], points[1][axis], points[2][axis]});
+        box.low[axis] = static_cast<float>(low);
+        box.high[axis] = static_cast<float>(high);
+        if (box.low[axis] > low) box.low[axis] = std::nextafter(box.low[axis], -kInfinity);
+        if (box.high[axis] < high) box.high[axis] = std::nextafter(box.high[axis], kInfinity);
+    }
+    return box;
+}
+
+constexpr std::int32_t kNoGroup = -1;
+
 /// Boxes around triangles [begin, end) of an order in which neighbours follow each other. `skip` is the node behind all
-/// children, as nodes are stored in the order in which they are visited.
+/// children, as nodes are stored in the order in which they are visited. `group` is that of all, if they have one.
 struct Node {
     Box box;
     std::size_t begin, end, skip;
+    std::int32_t group;
+};
+
+/// A triangle's place in the order: by group, then along a curve that fills space.
+struct Place {
+    std::int32_t group;
+    std::uint32_t code, triangle;
+
+    auto operator<=>(const Place&) const = default;
 };
 
 constexpr std::size_t kMostInLeaf = 4;
-constexpr std::size_t kWorthAThread = 2048;
-constexpr std::size_t kChunk = 256;
+constexpr std::size_t kWorthAThread = 512;
+constexpr std::size_t kChunk = 64;
 
 /// Interleaves with two zeros the ten bits of `value`, 0 to 1.
-std::uint64_t spread_bits(double value) noexcept {
-    auto bits = static_cast<std::uint64_t>(std::clamp(value, 0.0, 1.0) * 1023.0);
+std::uint32_t spread_bits(double value) noexcept {
+    auto bits = static_cast<std::uint32_t>(std::clamp(value, 0.0, 1.0) * 1023.0);
     bits = (bits | bits << 16) & 0x030000FF;
     bits = (bits | bits << 8) & 0x0300F00F;
     bits = (bits | bits << 4) & 0x030C30C3;
@@ -48,34 +77,47 @@ std::uint64_t spread_bits(double value) noexcept {
 class Tree {
 public:
     /// boxes  of triangles, by their place in the order
-    explicit Tree(std::span<const Box> boxes) : boxes_(boxes) {
+    Tree(std::span<const Box> boxes, std::span<const Place> order) : boxes_(boxes), order_(order) {
         nodes_.reserve(boxes.size());
         if (!boxes.empty()) add(0, boxes.size());
     }
 
-    /// Calls found(place) for each triangle behind `place` in the order whose box meets that one's.
+    std::size_t leaves() const noexcept { return leaves_.size(); }
+
+    /// Calls found(place, other) for each triangle of a leaf and each behind it in the order, of another group, whose
+    /// boxes meet.
     template <class Found>
-    void visit_behind(std::size_t place, const Found& found) const {
-        const Box& box = boxes_[place];
-        for (std::size_t i = 0; i < nodes_.size();) {
+    void visit(std::size_t leaf, const Found& found) const {
+        const Node& own = nodes_[leaves_[leaf]];
+        // What is behind the leaf in the order is stored behind it.
+        for (std::size_t i = leaves_[leaf]; i < nodes_.size();) {
             const Node& node = nodes_[i];
-            if (node.end <= place + 1 || !meet(node.box, box)) {
+            if (is_one_group(node.group, own.group) || !meet(node.box, own.box)) {
                 i = node.skip;
                 continue;
             }
-            if (node.skip == i + 1) {
-                for (std::size_t other = std::max(node.begin, place + 1); other < node.end; ++other) {
-                    if (meet(boxes_[other], box)) found(other);
-                }
-            }
-            ++i;
+            if (node.skip == ++i) visit_pairs(own, node, found);
         }
     }
 
 private:
+    static bool is_one_group(std::int32_t a, std::int32_t b) noexcept { return a == b && a != kNoGroup; }
+
+    template <class Found>
+    void visit_pairs(const Node& own, const Node& other, const Found& found) const {
+        for (std::size_t place = own.begin; place < own.end; ++place) {
+            if (!meet(boxes_[place], other.box)) continue;
+            for (std::size_t behind = std::max(other.begin, place + 1); behind < other.end; ++behind) {
+                if (is_one_group(order_[place].group, order_[behind].group)) continue;
+                if (meet(boxes_[place], boxes_[behind])) found(place, behind);
+            }
+        }
+    }
+
     Box add(std::size_t begin, std::size_t end) {
         const std::size_t own = nodes_.size();
-        nodes_.push_back({boxes_[begin], begin, end, 0});
+        const std::int32_t first = order_[begin].group;
+        nodes_.push_back({boxes_[begin], begin, end, 0, order_[end - 1].group == first ? first : kNoGroup});
         Box box = boxes_[begin];
         if (end - begin > kMostInLeaf) {
             const std::size_t middle = begin + (end - begin) / 2;
@@ -83,6 +125,7 @@ private:
             box = around(box, add(middle, end));
         } else {
             for (std::size_t i = begin + 1; i < end; ++i) box = around(box, boxes_[i]);
+            leaves_.push_back(own);
         }
         nodes_[own].box = box;
         nodes_[own].skip = nodes_.size();
@@ -90,7 +133,9 @@ private:
     }
 
     std::span<const Box> boxes_;
+    std::span<const Place> order_;
     std::vector<Node> nodes_;
+    std::vector<std::size_t> leaves_;
 };
 
 /// Whether an edge of `a` meets `b`.
@@ -128,57 +173,47 @@ bool share_a_vertex(const Corners& a, const Corners& b) noexcept {
 
 std::vector<std::array<std::int32_t, 2>> crossing_triangles(
     std::span<const Vec3<double>> points, std::span<const std::array<std::int32_t, 3>> triangles,
-    std::size_t threads) {
+    std::span<const std::int32_t> groups, std::size_t threads) {
     const auto corners_of = [&](const Corners& corners) {
         Triangle triangle;
         for (std::size_t k = 0; k < 3; ++k) triangle[k] = points[static_cast<std::size_t>(corners[k])];
         return triangle;
     };
-    const auto box_of = [&](const Corners& corners) {
-        const auto [a, b, c] = corners_of(corners);
-        return Box{glm::min(glm::min(a, b), c), glm::max(glm::max(a, b), c)};
-    };
-    Box whole{Point(std::numeric_limits<double>::max()), Point(std::numeric_limits<double>::lowest())};
-    for (const Point& point : points) whole = around(whole, {point, point});
-    const Point scale = 1.0 / glm::max(whole.high - whole.low, Point(std::numeric_limits<double>::min()));
-    // Along a curve that fills space (Morton, 1966), above the number of the triangle.
-    std::vector<std::uint64_t> order;
+    Point low(std::numeric_limits<double>::max()), high(std::numeric_limits<double>::lowest());
+    for (const Point& point : points) low = glm::min(low, point), high = glm::max(high, point);
+    const Point scale = 1.0 / glm::max(high - low, Point(std::numeric_limits<double>::min()));
+    std::vector<Place> order;
     order.reserve(triangles.size());
     for (std::size_t i = 0; i < triangles.size(); ++i) {
         const auto [a, b, c] = corners_of(triangles[i]);
-        const Point place = ((a + b + c) / 3.0 - whole.low) * scale;
+        const Point place = ((a + b + c) / 3.0 - low) * scale;
         if (!(glm::abs(place.x + place.y + place.z) < 4.0)) continue;  // not finite
-        const std::uint64_t code =
+        // Along the curve of Morton (1966).
+        const std::uint32_t code =
             spread_bits(place.x) << 2 | spread_bits(place.y) << 1 | spread_bits(place.z);
-        order.push_back(code << 32 | i);
+        const std::int32_t group = groups.empty() ? kNoGroup : std::max(groups[i], kNoGroup);
+        order.push_back({group, code, static_cast<std::uint32_t>(i)});
     }
     std::ranges::sort(order);
-    const auto triangle_at = [&](std::size_t place) { return static_cast<std::uint32_t>(order[place]); };
     std::vector<Box> boxes;
     boxes.reserve(order.size());
-    for (std::size_t i = 0; i < order.size(); ++i) boxes.push_back(box_of(triangles[triangle_at(i)]));
-    const Tree tree(boxes);
+    for (const Place& place : order) boxes.push_back(box_around(corners_of(triangles[place.triangle])));
+    const Tree tree(boxes, order);
     using Pairs = std::vector<std::array<std::int32_t, 2>>;
-    std::vector<Pairs> found((order.size() + kChunk - 1) / kChunk);
+    std::vector<Pairs> found((tree.leaves() + kChunk - 1) / kChunk);
     const auto search = [&](std::size_t begin, std::size_t end) {
-        for (std::size_t place = begin; place < end; ++place) {
-            const std::uint32_t own = triangle_at(place);
-            const Corners& corners = triangles[own];
-            const Triangle triangle = corners_of(corners);
-            tree.visit_behind(place, [&](std::size_t behind) {
-                const std::uint32_t other = triangle_at(behind);
-                const Corners& its = triangles[other];
-                if (share_a_vertex(corners, its)) return;
-                const Triangle another = corners_of(its);
-                if (an_edge_meets(triangle, another) || an_edge_meets(another, triangle)) {
-                    const auto [first, second] = std::minmax(own, other);
-                    found[begin / kChunk].push_back(
-                        {static_cast<std::int32_t>(first), static_cast<std::int32_t>(second)});
-                }
-            });
-        }
+        const auto add_crossing = [&](std::size_t place, std::size_t behind) {
+            const std::uint32_t own = order[place].triangle, other = order[behind].triangle;
+            if (share_a_vertex(triangles[own], triangles[other])) return;
+            const Triangle a = corners_of(triangles[own]), b = corners_of(triangles[other]);
+            if (!an_edge_meets(a, b) && !an_edge_meets(b, a)) return;
+            const auto [first, second] = std::minmax(own, other);
+            found[begin / kChunk].push_back(
+                {static_cast<std::int32_t>(first), static_cast<std::int32_t>(second)});
+        };
+        for (std::size_t leaf = begin; leaf < end; ++leaf) tree.visit(leaf, add_crossing);
     };
-    parallel_for(order.size(), useful_threads(threads, order.size(), kWorthAThread), search, kChunk);
+    parallel_for(tree.leaves(), useful_threads(threads, tree.leaves(), kWorthAThread), search, kChunk);
     Pairs pairs;
     for (const Pairs& of : found) pairs.insert(pairs.end(), of.begin(), of.end());
     std::ranges::sort(pairs);

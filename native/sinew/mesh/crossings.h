@@ -17,9 +17,10 @@ namespace sinew {
 ///
 /// points     [vertices]
 /// triangles  [triangles][3] vertices; they must exist
+/// groups     [triangles], or empty: two of one group do not count, as where one bone moves both; below 0: of none
 /// threads    at most so many; 0: as many as useful
 [[nodiscard]] SINEW_EXPORT std::vector<std::array<std::int32_t, 2>> crossing_triangles(
     std::span<const Vec3<double>> points, std::span<const std::array<std::int32_t, 3>> triangles,
-    std::size_t threads = 0);
+    std::span<const std::int32_t> groups = {}, std::size_t threads = 0);
 
 }  // namespace sinew

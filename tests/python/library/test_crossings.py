@@ -38,9 +38,14 @@ def test_crossings_of_random_triangles(seed, threads):
     rng = np.random.default_rng(seed)
     points = rng.normal(size=(90, 3)) * rng.choice([0.2, 1.0, 5.0], size=(90, 1))
     triangles = np.array([rng.choice(90, 3, replace=False) for _ in range(120)], np.int32)
-    found = sinew.crossing_triangles(points, triangles, threads)
+    found = sinew.crossing_triangles(points, triangles, threads=threads)
     assert found.tolist() == by_definition(points, triangles)
     assert len(found) > 100
+    groups = rng.integers(-1, 3, len(triangles), np.int32)
+    first, second = groups[found].T
+    apart = sinew.crossing_triangles(points, triangles, groups, threads)
+    np.testing.assert_array_equal(apart, found[(first != second) | (first < 0)])
+    assert 0 < len(apart) < len(found)
 
 
 def test_a_surface_that_is_far_from_the_origin():
@@ -79,3 +84,5 @@ def test_what_does_not_cross():
     assert sinew.crossing_triangles(np.empty((0, 3)), np.empty((0, 3), np.int32)).shape == (0, 2)
     with pytest.raises(ValueError, match="triangles: expected vertices from 0 to 5, got 6"):
         sinew.crossing_triangles(points, [[0, 1, 6]])
+    with pytest.raises(ValueError, match=r"groups: expected None or int32 \[2\], got"):
+        sinew.crossing_triangles(points, across, [0])

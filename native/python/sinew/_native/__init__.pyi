@@ -449,13 +449,14 @@ def centres_of_rotation(rest_points: numpy.typing.ArrayLike, influence_offsets: 
     gives_way: at a low priority, so that frames which are deformed meanwhile lose little; on a busy machine it then
         takes much longer.
     """
-def crossing_triangles(points: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.int32]:
+def crossing_triangles(points: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, groups: typing.Any = None, threads: typing.SupportsIndex | None = None) -> numpy.typing.NDArray[numpy.int32]:
     """Pairs of triangles of a surface that cross, int32 [pairs, 2]: an edge of one meets the other, and they
     share no vertex. The lower index comes first, and pairs ascend. Triangles in one plane do not cross, nor do those of
     points that are NaN.
 
     points: float64 [vertices, 3].
     triangles: int32 [triangles, 3].
+    groups: int32 [triangles]; two of one group do not count, as where one bone moves both. Below 0: of none.
     """
 def direct_delta_mush(rest_points: numpy.typing.ArrayLike, influence_offsets: numpy.typing.ArrayLike, influence_bones: numpy.typing.ArrayLike, influence_weights: numpy.typing.ArrayLike, triangles: numpy.typing.ArrayLike, radius: typing.SupportsFloat | typing.SupportsIndex, *, exact: bool = False, threads: typing.SupportsIndex | None = None, gives_way: bool = False) -> Precomputation:
     """Starts to compute the vertex data of the method "ddm": the moments of each bone's smoothed weights around
