@@ -41,8 +41,8 @@ Variants = Mapping[str, Mapping[bpy.types.Object, Variant]]
 """By keys of variants, what each is for objects for which it is not what the key says."""
 NOTES = (
     "The browser skins the meshes by the shaders that Sinew has for engines: Linear Blend, Dual Quaternion, "
-    "Centres of Rotation and the painted mix of two, Twist Spread and Limit Bulge. Shapes of other methods and "
-    "of Delta Mush are recorded in each frame.",
+    "Centres of Rotation and the painted mix of two, Twist Spread and Limit Bulge. Shapes of other methods "
+    "and of Delta Mush are recorded in each frame.",
     "Shapes are those right after the skinning, without the modifiers behind it.",
 )
 

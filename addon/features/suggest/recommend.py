@@ -126,8 +126,8 @@ def _in_frames(
     over: str,
     read: dict[float, live.Moment],
 ) -> Generator[float, None, list[tuple[str, live.Moment]]]:
-    """Returns the frames in which joints bend most; none without an action, or where none bends by much. `read`
-    gets all that were looked at."""
+    """Returns the frames in which joints bend most; none without an action, or where none bends by much.
+    `read` gets all that were looked at."""
     armatures = armatures_of(objects)
     try:
         frames = stepped.frames_over(scene, armatures, over)

@@ -109,8 +109,8 @@ def _measured(method: str, moment: live.Moment, choice: Choice) -> Measured:
 
 
 def _moved_alike(moment: live.Moment, first: Measured, measured: Measured) -> np.ndarray | None:
-    """Triangles that a bone moves as a whole, as groups of crossings(): they cross as they do at rest. None where
-    stages or neighbours move vertices otherwise.
+    """Triangles that a bone moves as a whole, as groups of crossings(): they cross as they do at rest. None
+    where stages or neighbours move vertices otherwise.
 
     first  the shape of the linear blend
     """

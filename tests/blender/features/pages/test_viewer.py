@@ -183,8 +183,8 @@ def test_variants_are_those_that_blender_shows(tmp_path, way):
 
 
 def test_what_the_shaders_lack_of_the_file_is_recorded(tmp_path):
-    """Delta Mush with the painted mix, another rule for scale, two Armature modifiers of which one has a vertex
-    group."""
+    """Delta Mush with the painted mix, another rule for scale, two Armature modifiers of which one has a
+    vertex group."""
     obj = make_limb(150.0)
     scenes.set_stage(obj, "delta_mush", iterations=5)
     path = scenes.save(tmp_path / "arm.blend")
