@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from ..features.measure.diagnostics import USUAL_INFLUENCES
 from ..features.pages.page import page
 from ..features.pages.templates import require_jinja
 from ..skinning.parameters import PRESETS
-from ..skinning.variants import SYNTAX, USUAL, parse_list
+from ..skinning.variants import SYNTAX, USUAL, Variant, parse_list, title_of
 from .arguments import (
     add_engine,
     add_files,
@@ -47,7 +47,8 @@ HELP = (
     "Writes DIR/NAME.html for each file, a page that needs nothing else: pictures of the "
     "worst frames under each method with one camera, heat maps, close-ups of the worst places, plots "
     "over the frames, diagnostics of the weights. Beside it DIR/NAME/ with metrics.json and "
-    "the pictures. --viewer writes a page in which the character moves and turns."
+    "the pictures. --viewer writes a page in which the character moves and turns; with --sheet one of its "
+    "range of motion, in which a click on a picture of the sheet goes there."
 )
 
 
@@ -148,7 +149,7 @@ def run(args: argparse.Namespace, console: Console) -> int:
 
 
 def _run_sheet(args: argparse.Namespace, console: Console) -> int:
-    given = {"--out": args.out, "--viewer": args.viewer, "--methods": args.methods, "--frames": args.frames}
+    given = {"--out": args.out, "--methods": args.methods, "--frames": args.frames}
     for option in (option for option, value in given.items() if value is not None):
         raise WrongUse(f"--sheet: {option} does not go with it; --variants names its rows")
     if len(args.files) > 1:
@@ -166,7 +167,7 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
     import bpy
 
     from ..deform import characters
-    from ..features.pages import contact_sheet, sheet_picture
+    from ..features.pages import contact_sheet, motion_page, sheet_picture
     from ..features.pages.pictures import write_picture
     from ..features.pages.sheet import Sheet
     from ..io import files
@@ -178,18 +179,41 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
     meshes, left_out = characters.taken(found, path, ["dq"])
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
-    rows = [characters.with_presets(own[each]) for each in variants]
+    rows = {each: characters.with_presets(own[each]) for each in variants}
+    if args.variants is None:
+        rows = _without_repeats(rows)
     console.note_on(path, characters.sentences())
     joints, size = contact_sheet.columns(meshes), args.size or 240
-    labels = [each.title for each in variants]
+    labels = [title_of(each, row.values()) for each, row in rows.items()]
     sheet = Sheet(path.stem, labels, contact_sheet.headings(joints), is_difference=args.difference)
     count = len(rows) * len(joints)
-    for cell in console.progress(contact_sheet.cells(joints, rows, size), count, f"Drawing {path.name}"):
+    for cell in console.progress(
+        contact_sheet.cells(joints, list(rows.values()), size), count, f"Drawing {path.name}"
+    ):
         sheet.add(cell)
     ticks = contact_sheet.ticks(bpy.context.scene, sheet.scale)
     write_picture(args.sheet, sheet_picture.compose(sheet, size, ticks))
     console.say(str(args.sheet))
+    if args.viewer is not None:
+        of_keys = {each.key: row for each, row in rows.items()}
+        steps = motion_page.page(bpy.context.scene, sheet, joints, of_keys, size, left_out)
+        with console.bar(f"Posing {path.name}", len(joints)) as show:
+            text = result_of(steps, show)
+        write_text(args.viewer, text)
+        console.say(str(args.viewer))
     return not left_out
+
+
+def _without_repeats(
+    rows: Mapping[Variant, dict[bpy.types.Object, Variant]],
+) -> dict[Variant, dict[bpy.types.Object, Variant]]:
+    """Leaves out what a preset is, too."""
+    presets = [row for variant, row in rows.items() if variant.method in PRESETS]
+
+    def is_repeated(row: Mapping[bpy.types.Object, Variant]) -> bool:
+        return any(all(own.agrees_with(of[obj]) for obj, own in row.items()) for of in presets)
+
+    return {each: row for each, row in rows.items() if each.method in PRESETS or not is_repeated(row)}
 
 
 def _check_variants(args: argparse.Namespace) -> None:

@@ -185,6 +185,17 @@ class Variant:
         return phrase("{name}: {label}", name=self.name, label=self.label)
 
 
+def title_of(variant: Variant, chosen: Iterable[Variant]) -> Phrase:
+    """Returns its title; of a preset and of FILE with what they are.
+
+    chosen  what it is for each mesh
+    """
+    found = list(dict.fromkeys(replace(each, name="") for each in chosen))
+    if variant.method not in (FILE, *PRESETS) or len(found) != 1:
+        return variant.title
+    return phrase("{name}: {label}", name=variant.title, label=found[0].label)
+
+
 def parse(text: str) -> Variant:
     """Reads one variant. Raises WrongUse."""
     text = re.sub(r"\s*([=+:])\s*", r"\1", text.strip())

@@ -157,6 +157,7 @@ class SINEW_MT_compare(_Submenu, bpy.types.Menu):
     entries = (
         Entry("sinew.compare", "Compare Methods\u2026", icon="MOD_ARRAY"),
         Entry("sinew.contact_sheet", icon="IMGDISPLAY"),
+        Entry("sinew.save_contact_sheet", "Save Sheet as Page\u2026", icon="URL"),
         Entry("sinew.flip_comparison"),
         Entry("sinew.save_comparison", "Save as Page\u2026", icon="URL"),
         Entry("sinew.end_comparison"),

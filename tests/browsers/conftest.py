@@ -89,6 +89,15 @@ def varied(tmp_path_factory):
 
 
 @pytest.fixture(scope="session")
+def sheet(tmp_path_factory):
+    """A page with a contact sheet."""
+    page = tmp_path_factory.mktemp("sheet") / "elbow.html"
+    source, variants = REPOSITORY / "blend_files/elbow.blend", "blender, dq, Soft=dq+delta_mush"
+    sinew("compare", source, "--sheet", page.with_suffix(".png"), "--variants", variants, "--viewer", page)
+    return page
+
+
+@pytest.fixture(scope="session")
 def made(tmp_path_factory):
     """By name: files whose meshes are in armature space, so that it is the space of `sinew points`."""
     folder, files = tmp_path_factory.mktemp("pages"), REPOSITORY / "blend_files"

@@ -22,6 +22,7 @@ from ..pages.sheet import Cell, Sheet
 from ..pages.sheet_layout import Hit, Layout, Panned
 from ..variants import choices, keys
 from . import look, overlay, rows
+from .save import SINEW_OT_save_contact_sheet
 
 IMAGE = "Contact Sheet"
 WHEEL = {"WHEELUPMOUSE": 1, "WHEELDOWNMOUSE": -1}
@@ -313,4 +314,6 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
         self.area.tag_redraw()
 
 
-FEATURE = Feature((SINEW_OT_contact_sheet,), overlays=(overlay.draw,), end=overlay.shown.clear)
+FEATURE = Feature(
+    (SINEW_OT_contact_sheet, SINEW_OT_save_contact_sheet), overlays=(overlay.draw,), end=overlay.shown.clear
+)

@@ -49,12 +49,12 @@ def joints(context: bpy.types.Context) -> list[Bent]:
     meshes = sinew_targets(context)
     if any(obj.mode == "EDIT" for obj in meshes):
         raise SinewError("Leave edit mode first")
-    with _switched_on(context):
+    with switched_on(context):
         return columns(meshes)
 
 
 @contextmanager
-def _switched_on(context: bpy.types.Context) -> Iterator[None]:
+def switched_on(context: bpy.types.Context) -> Iterator[None]:
     """Context in which Sinew deforms all meshes that follow the character; what is off has nothing to
     measure."""
     off = [obj for obj in character.followers(context) if not properties.of(obj).enabled]

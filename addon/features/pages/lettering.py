@@ -84,10 +84,14 @@ class Letters:
 @contextmanager
 def letters(*sizes: int) -> Iterator[list[Letters]]:
     """Context with letters of these sizes; nothing of it stays in the file."""
+    fonts = list(bpy.data.fonts)
     curve = bpy.data.curves.new("Letters", "FONT")
-    obj = bpy.data.objects.new("Letters", curve)
+    obj, font = bpy.data.objects.new("Letters", curve), curve.font
     try:
         yield [Letters(size, curve, obj) for size in sizes]
     finally:
         bpy.data.objects.remove(obj)
         bpy.data.curves.remove(curve)
+        # Blender's own font became a datablock.
+        if font not in fonts and not font.users:
+            bpy.data.fonts.remove(font)

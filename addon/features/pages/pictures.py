@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Reads and writes PNG files with Blender itself, so that nothing has to be installed."""
+"""Reads and writes PNG and WebP files with Blender itself, so that nothing has to be installed."""
 
 from pathlib import Path
 
@@ -30,12 +30,12 @@ def read_picture(path: Path) -> np.ndarray:
 
 
 def write_picture(path: Path, pixels: np.ndarray) -> None:
-    """Writes a PNG with 8 bits per channel."""
+    """Writes a PNG or a WebP, by the name's ending, with 8 bits per channel."""
     height, width, _channels = pixels.shape
     image = bpy.data.images.new("Sinew Picture", width, height, alpha=True)
     try:
         image.pixels.foreach_set(np.ascontiguousarray(pixels, dtype=np.float32).ravel())
-        image.file_format = "PNG"
+        image.file_format = path.suffix[1:].upper()
 
         def write(unfinished: Path) -> None:
             image.filepath_raw = str(unfinished)

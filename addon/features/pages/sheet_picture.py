@@ -19,7 +19,7 @@ Canvas = np.ndarray
 def compose(sheet: Sheet, size: int, ticks: Sequence[str]) -> np.ndarray:
     """Returns float32 [height, width, 4], RGBA in 0..1, from the bottom row up.
 
-    size   pixels of each cell's picture
+    size   pixels of each cell's picture, of which cells may have a whole multiple
     ticks  the least and the most of the colours of a difference, with units
     """
     layout = Layout(len(sheet.rows), len(sheet.columns), size)
@@ -50,7 +50,8 @@ def compose(sheet: Sheet, size: int, ticks: Sequence[str]) -> np.ndarray:
 def _draw_cells(canvas: Canvas, sheet: Sheet, layout: Layout, small: Letters) -> None:
     scale, marks = sheet.scale, [sheet.best(column) for column in range(layout.columns)]
     for (row, column), cell in sheet.cells.items():
-        _part(canvas, layout.picture(row, column))[:] = sheet.pixels(cell, scale)[::-1, :, :3]
+        pixels = _reduced(sheet.pixels(cell, scale), layout.size)
+        _part(canvas, layout.picture(row, column))[:] = pixels[::-1, :, :3]
         for number, (name, value) in enumerate(cell.figures._asdict().items()):
             box, is_best = layout.figure(row, column, number), name in marks[column][row]
             colour = BEST if is_best else FAINT
@@ -58,6 +59,12 @@ def _draw_cells(canvas: Canvas, sheet: Sheet, layout: Layout, small: Letters) ->
                 _draw_dot(canvas, box, layout.small_letters)
             text = figure_text(tr(name), value, name == "volume")
             small.draw(canvas, box.left + 0.7 * layout.small_letters, box.top, text, colour)
+
+
+def _reduced(pixels: np.ndarray, size: int) -> np.ndarray:
+    """Returns float32 [size, size, 4]: means of squares."""
+    each = len(pixels) // size
+    return pixels.reshape(size, each, size, each, -1).mean(axis=(1, 3))
 
 
 def _draw_dot(canvas: Canvas, line: Box, size: int) -> None:

@@ -24,11 +24,11 @@ from ...skinning.influences import Influences
 from ...skinning.rig import Bones
 from ...skinning.scale_rule import BLENDER_4
 from ...skinning.twist_spread import NOT_TOLD, TwistInputs
-from ...skinning.variants import Variant, is_key, parse
+from ...skinning.variants import Variant, is_key, parse, title_of
 from ...skinning.vectors import transformed
 from ...skinning.vertex_data import VertexData
 from ..measure import battery, live
-from .viewer_page import BLENDER, METHODS, MIX, Form, Found, Look, Part, Stages, Viewer
+from .viewer_page import BLENDER, METHODS, MIX, Form, Found, Look, PageSheet, Part, Stages, Viewer
 
 # The method of meshes that have none of their own; any of Sinew's would do.
 PLAYED = "dq"
@@ -178,7 +178,7 @@ def page(
     methods: Sequence[str],
     frames: Sequence[float] | Sequence[Pose],
     left_out: Sequence[str] = (),
-    found: Found | None = None,
+    beside: Found | PageSheet | None = None,
     variants: Variants = MappingProxyType({}),
 ) -> Generator[float, None, str]:
     """Yields the progress, returns the text of the page. Sets frames; restoring is the caller's.
@@ -188,7 +188,7 @@ def page(
     methods   those to choose from, or keys of variants; shapes that the shaders lack are recorded
     frames    of the scene, or poses beside the one that it has
     left_out  sentences on other meshes
-    found     what Flex found in these poses
+    beside    what Flex found in these poses, or a contact sheet of them
 
     Raises SinewError where no mesh can be shown.
     """
@@ -207,14 +207,17 @@ def page(
             notes.append(f"{obj.name}: left out: {error}")
     if not skinned:
         raise SinewError("; ".join(notes[len(NOTES) :]))
-    labels = {name: _label(name) for name in methods}
+    labels = {name: _label(name, [of[name] for of in own.values() if name in of]) for name in methods}
     # A variant says itself whether it is mixed.
     if any(each.part.mix is not None for each in skinned) and not all(map(is_key, methods)):
-        labels = {MIX: "Painted Mix", **labels} if found else {**labels, MIX: "Painted Mix"}
+        labels = (
+            {MIX: "Painted Mix", **labels} if isinstance(beside, Found) else {**labels, MIX: "Painted Mix"}
+        )
     shown_meshes = [*skinned, *(_read_attached(obj) for obj in attached)]
-    rate = POSES_A_SECOND if found else scene.render.fps / scene.render.fps_base
+    is_of_poses = isinstance(frames[0], Pose)
+    rate = POSES_A_SECOND if is_of_poses else scene.render.fps / scene.render.fps_base
     parts = [each.part for each in shown_meshes]
-    viewer = Viewer(title, parts, labels, rate, characters.length_unit(scene), notes, found)
+    viewer = Viewer(title, parts, labels, rate, characters.length_unit(scene), notes, beside)
     for number, frame in enumerate(frames):
         pose = frame if isinstance(frame, Pose) else None
         if pose is None:
@@ -229,8 +232,9 @@ def page(
     return viewer.page()
 
 
-def _label(name: str) -> str:
-    return parse(name).title if is_key(name) else properties.method_label(name)
+def _label(name: str, chosen: Iterable[Variant]) -> str:
+    """chosen: what a key is for each mesh"""
+    return title_of(parse(name), chosen) if is_key(name) else properties.method_label(name)
 
 
 def _has_look(variant: Variant, rule: str) -> bool:

@@ -13,7 +13,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from html import escape
 from pathlib import Path
-from typing import Any, Literal, TypeAlias
+from typing import Any, Literal, NamedTuple, TypeAlias
 
 import numpy as np
 import sinew
@@ -35,6 +35,8 @@ from .bone_buffer import (
     twist_angles,
 )
 from .page import legend_texts
+from .sheet_layout import Box, Layout
+from .views import View
 
 # Steps of recorded offsets, as a part of the diagonal at rest; more where 16 bits hold too few of them.
 OFFSET_STEP = 2e-6
@@ -368,6 +370,62 @@ class Found:
     findings: Sequence[Mapping[str, Any]]
 
 
+class Place(NamedTuple):
+    """What a column of a contact sheet shows: a frame of the page, by its place, and from where."""
+
+    frame: int
+    view: View
+
+
+@dataclass(frozen=True)
+class PageSheet:
+    """A contact sheet on which one clicks.
+
+    picture  of the whole sheet, a WebP
+    layout   of the picture
+    rows     names of the page
+    places   of the columns
+    titles   of the columns, for readers
+    """
+
+    picture: bytes
+    layout: Layout
+    rows: Sequence[str]
+    places: Sequence[Place]
+    titles: Sequence[str]
+
+    def header(self) -> dict[str, Any]:
+        """What the page has of it; boxes are shares of the picture: left, top, width, height."""
+        layout = self.layout
+        whole = (layout.width, layout.height)
+
+        def shares(box: Box) -> list[float]:
+            return [value / of for value, of in zip(box, (*whole, *whole), strict=True)]
+
+        return {
+            "picture": "data:image/webp;base64," + base64.b64encode(self.picture).decode("ascii"),
+            "width": layout.width,
+            "rows": [
+                {
+                    "name": name,
+                    "label": shares(layout.label(row)),
+                    "cells": [shares(layout.picture(row, column)) for column in range(layout.columns)],
+                }
+                for row, name in enumerate(self.rows)
+            ],
+            "columns": [
+                {
+                    "title": title,
+                    "frame": place.frame,
+                    "direction": place.view.direction.tolist(),
+                    "target": place.view.target.tolist(),
+                    "width": place.view.width,
+                }
+                for place, title in zip(self.places, self.titles, strict=True)
+            ],
+        }
+
+
 class Viewer:
     """The parts and frames of a page.
 
@@ -376,7 +434,7 @@ class Viewer:
     rate     frames a second
     unit     of lengths: "m", or "units"
     notes    sentences on what the page leaves out
-    found    where frames are poses of Flex
+    beside   where frames are poses: what the page lists or shows of them
     """
 
     def __init__(
@@ -387,10 +445,12 @@ class Viewer:
         rate: float,
         unit: str,
         notes: Sequence[str] = (),
-        found: Found | None = None,
+        beside: Found | PageSheet | None = None,
     ) -> None:
         self.title, self.parts, self.methods, self.rate, self.unit = title, parts, methods, rate, unit
-        self.notes, self.found = list(notes), found
+        self.notes = list(notes)
+        self.found = beside if isinstance(beside, Found) else None
+        self.sheet = beside if isinstance(beside, PageSheet) else None
         self.frames: list[float | str] = []
         self._distance, self._stretch = _Range(0.0), _Range(1.0)
         self._worst, self._start = -1.0, 0
@@ -459,7 +519,9 @@ class Viewer:
             "low": boxes[:, 0].tolist(),
             "high": boxes[:, 1].tolist(),
             "notes": self.notes,
+            "isOfPoses": isinstance(self.frames[0], str),
             "flex": asdict(self.found) if self.found else None,
+            "sheet": self.sheet.header() if self.sheet else None,
             "measures": [self._measure(scale) for scale in scales],
             "parts": [
                 {

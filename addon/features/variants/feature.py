@@ -145,6 +145,7 @@ class SINEW_PT_variants(Sidebar, operators.OfSkinned, bpy.types.Panel):
         layout.operator("sinew.add_variant", text="Add What Is Set Now", icon="ADD")
         row = layout.row(align=True)
         row.operator("sinew.contact_sheet", icon="IMGDISPLAY")
+        row.operator("sinew.save_contact_sheet", text="", icon="EXPORT")
         row.operator("sinew.variant_keys", icon="LINENUMBERS_ON")
 
 

@@ -231,9 +231,11 @@ const plus = (a, b, factor = 1) => a.map((x, i) => x + factor * b[i]);
 const names = Object.keys(header.methods), last = header.frames.length - 1;
 const { findings = [], verdict = "" } = header.flex ?? {};
 const state = {
-  frame: header.start, playing: false, panes: !header.flex && names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
+  frame: header.start, playing: false, panes: !header.flex && !header.sheet && names.length > 1 && innerWidth > 560 ? 2 : 1, methods: [names[0], names[names.length - 1]],
   // Where two are shown over each other: the share of the width that is the left one's.
   wipe: null,
+  // Whether the contact sheet is shown, and the row and column that were chosen there.
+  isSheet: Boolean(header.sheet), cell: null,
   measure: 0, most: Infinity, stages: true, finding: -1, yaw: 0.6, pitch: 0.12, zoom: 1, offset: [0, 0, 0],
 };
 const isWiped = () => state.panes === 2 && state.wipe !== null;
@@ -449,7 +451,7 @@ function showFrame() {
 }
 
 // What a frame is called.
-const step = header.flex ? "pose" : "frame";
+const step = header.isOfPoses ? "pose" : "frame";
 // The stops of the slider.
 const stops = [1, 2, 3, 4, 8].filter((n) => n < most).concat(Infinity);
 
@@ -459,6 +461,7 @@ function show() {
   find("play").setAttribute("aria-label", state.playing ? "Pause" : "Play");
   const panes = isWiped() ? "wipe" : String(state.panes);
   for (const input of document.querySelectorAll("[name=panes]")) input.checked = input.value === panes;
+  if (header.sheet) showSheet();
   findings.forEach((_, i) => {
     const [button, more] = find("findings").children[i].children;
     button.setAttribute("aria-pressed", i === state.finding);
@@ -510,6 +513,55 @@ function set(values) {
 function flip() {
   set({ methods: [state.methods[1], state.methods[0]] });
   say(`Now ${state.methods.slice(0, state.panes).map(shownLabel).join(" and ")}`);
+}
+
+// --- The contact sheet
+
+function listCells() {
+  for (const one of document.querySelectorAll(".of-sheet")) one.hidden = !header.sheet;
+  if (!header.sheet) return;
+  const { picture, width, rows, columns } = header.sheet, image = document.createElement("img");
+  const button = ([left, top, wide, high], label, values) => {
+    const made = Object.assign(document.createElement("button"), { type: "button", ...values });
+    Object.entries({ left, top, width: wide, height: high }).forEach(([name, share]) => {
+      made.style[name] = `${100 * share}%`;
+    });
+    made.setAttribute("aria-label", label);
+    return made;
+  };
+  find("cells").style.width = `min(100%, ${width}px)`;
+  find("cells").replaceChildren(Object.assign(image, { src: picture, alt: "" }), ...rows.flatMap((row, i) => [
+    button(row.label, methodLabel(row.name), { onclick: () => chooseRow(i) }),
+    ...row.cells.map((box, k) => button(box, `${columns[k].title}, ${methodLabel(row.name)}`, { onclick: () => chooseCell(i, k) })),
+  ]));
+}
+
+function showSheet() {
+  find("sheet").hidden = !state.isSheet;
+  find("sheet-shown").textContent = state.isSheet ? "Close" : "Show";
+  const buttons = [...find("cells").querySelectorAll("button")], { columns } = header.sheet;
+  buttons.forEach((button, k) => {
+    const place = [Math.floor(k / (columns.length + 1)), k % (columns.length + 1) - 1];
+    button.setAttribute("aria-pressed", String(place) === String(state.cell));
+  });
+}
+
+// Beside the first row, or the second beside the first: F flips between both.
+function chooseRow(row) {
+  const { rows } = header.sheet;
+  set({ methods: [rows[row].name, rows[row ? 0 : rows.length - 1].name], isSheet: false });
+}
+
+function chooseCell(row, column) {
+  const { frame, direction, target, width, title } = header.sheet.columns[column];
+  set({ frame, playing: false, cell: [row, column] });
+  chooseRow(row);
+  const its = camera(canvas.clientWidth / viewCount() / canvas.clientHeight);
+  fly({
+    yaw: Math.atan2(direction[0], -direction[1]), pitch: Math.asin(Math.min(Math.max(direction[2], -1), 1)),
+    zoom: state.zoom * its.distance * its.half / (0.55 * width), offset: plus(target, its.middle, -1),
+  });
+  say(`${title}, ${methodLabel(state.methods[0])}`);
 }
 
 // --- Flex
@@ -588,7 +640,7 @@ function flyOn() {
 
 function listFindings() {
   for (const one of document.querySelectorAll(".of-flex")) one.hidden = !header.flex;
-  document.body.classList.toggle("has-poses", Boolean(header.flex));
+  document.body.classList.toggle("has-poses", header.isOfPoses);
   const made = (name, text) => Object.assign(document.createElement(name), { textContent: text });
   find("verdict").textContent = verdict;
   find("findings").replaceChildren(...findings.map(({ joint, measure, value, limit, frame, meaning, advice }, i) => {
@@ -614,6 +666,10 @@ const actions = {
     set({ panes: 2, wipe: isWiped() ? null : 0.5 });
     say(isWiped() ? "Wipe" : "Side by side");
   },
+  ...(header.sheet && {
+    c: () => set({ isSheet: !state.isSheet }),
+    Escape: () => set({ isSheet: !state.isSheet }),
+  }),
   ...(staged.length && {
     s: () => {
       set({ stages: !state.stages });
@@ -663,9 +719,10 @@ function connect() {
   });
   for (const form of ["panel", "time"]) find(form).addEventListener("submit", (event) => event.preventDefault());
   find("flip").addEventListener("click", flip);
+  find("sheet-shown").addEventListener("click", () => set({ isSheet: !state.isSheet }));
   find("play").addEventListener("click", actions[" "]);
   find("frame").max = last;
-  find("frame").setAttribute("aria-label", header.flex ? "Pose" : "Frame");
+  find("frame").setAttribute("aria-label", header.isOfPoses ? "Pose" : "Frame");
   find("frame").addEventListener("input", ({ target }) => set({ playing: false, frame: Number(target.value) }));
   find("time").hidden = last === 0;
   find("stages-set").hidden = !staged.length;
@@ -757,6 +814,7 @@ if (!way) return;
 connect();
 connectWipe();
 listFindings();
+listCells();
 connectKeys();
 prefersDark.addEventListener("change", changed);
 show();

@@ -8,6 +8,7 @@ import bpy
 import five_meshes
 import numpy as np
 import pytest
+import read_page
 import scenes
 import test_clip
 import whole_file
@@ -105,6 +106,38 @@ def test_the_image(character, is_on):
     np.testing.assert_allclose(part(coloured, first), part(plain, first), atol=1e-6)
     hues = np.ptp(part(coloured, second), axis=2)
     assert hues.max() > 0.3 > np.ptp(part(plain, second), axis=2).max()
+
+
+@pytest.mark.parametrize("is_on", [True, False])
+def test_the_sheet_as_a_page(character, tmp_path, is_on):
+    """Of each cell: the pose that it goes to, with the shape and the view that it shows; and all else of the
+    range of motion. The artist's pose, frame and settings stay."""
+    obj, armature = character
+    scenes.set_stage(obj, "delta_mush", iterations=7)
+    bpy.ops.sinew.add_variant(name="Soft")
+    scenes.set_stage(obj, "delta_mush", enabled=False)
+    properties.of(obj).enabled = is_on
+    joints, before, content = rows.joints(bpy.context), scenes.world_points(obj), whole_file.content()
+    page = tmp_path / "sheet.html"
+    assert bpy.ops.sinew.save_contact_sheet(filepath=str(page)) == {"FINISHED"}
+    np.testing.assert_array_equal(scenes.world_points(obj), before)
+    whole_file.assert_same(content)
+    header, (arrays,) = read_page.read(page)
+    sheet, variants = header["sheet"], rows.rows(bpy.context, "")
+    keys = [each.key for each in variants]
+    assert [row["name"] for row in sheet["rows"]] == keys == list(header["methods"])
+    assert len(sheet["columns"]) == len(joints) == len(sheet["rows"][0]["cells"])
+    assert header["frames"][0] == "At rest"
+    of_range = motion_range.poses(joints[0].rig.bones, {}, joints[0].rig.is_moving)
+    assert header["frames"][1 : 1 + len(of_range)] == [pose.name for pose in of_range]
+    world = np.array(armature.matrix_world)
+    for column, joint in zip(sheet["columns"], joints, strict=True):
+        np.testing.assert_allclose(column["target"], joint.view.target)
+        np.testing.assert_allclose(column["direction"], joint.view.direction)
+        for variant in variants:
+            found = read_page.points(header["parts"][0], arrays, variant.key, column["frame"])
+            expected = joint.moment.points_under([variant])
+            assert scenes.worst(found @ world[:3, :3].T + world[:3, 3], expected) < 1e-5
 
 
 def pixels() -> np.ndarray:

@@ -7,6 +7,7 @@ from __future__ import annotations
 import bpy
 import numpy as np
 import pytest
+import read_page
 import scenes
 from mathutils import Matrix
 from PIL import Image
@@ -88,6 +89,11 @@ def test_the_command_writes_a_cell_for_each(tmp_path):
     run_sinew("compare", path, "--sheet", coloured, *options)
     assert is_yellow(np.asarray(Image.open(coloured).convert("RGB"))).sum() > 50
     assert not is_yellow(pixels).any()
+    page = tmp_path / "sheet.html"
+    run_sinew("compare", path, "--sheet", sheet, "--variants", "dq, soft=lbs+delta_mush", "--viewer", page)
+    header, _meshes = read_page.read(page)
+    assert [row["name"] for row in header["sheet"]["rows"]] == ["=dq", "soft=lbs+delta_mush"]
+    assert header["methods"]["soft=lbs+delta_mush"] == "soft: Linear Blend with Delta Mush"
     wrong = run_sinew("compare", path, "--out", tmp_path, "--difference", status=2)
     assert "it goes with --sheet" in wrong.stderr
     wrong = run_sinew("compare", path, "--sheet", sheet, "--frames", "1", status=2)
