@@ -19,8 +19,9 @@ from ..features.flex.report import Report, junit, lines, markdown, of_file
 from ..features.measure.limits import Table, read_table
 from ..jobs.inputs import files_of
 from ..jobs.journal import Journal, content_hash
+from ..skinning.variants import BLENDER, WHOLE, Variant
 from . import batch
-from .arguments import add_json, add_object, add_viewer, check_viewer, file_named, methods
+from .arguments import add_json, add_object, add_viewer, check_viewer, file_named, methods, variants
 from .console import BatchProgress, Console
 
 SUMMARY = "bend each joint of characters, and say which deform well"
@@ -41,6 +42,13 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         metavar="METHODS",
         help="others to try, of `sinew methods`, such as dq,cor: they are named where they mend a joint; the "
         "verdict is on the method that a file has",
+    )
+    parser.add_argument(
+        "--variants",
+        type=variants,
+        default=[],
+        metavar="VARIANTS",
+        help="others to try, with their stages, as of `sinew compare`, such as dq+delta_mush",
     )
     add_object(parser)
     parser.add_argument("--poses", type=Path, metavar="TABLE.toml", help="poses of joints, in [joints]")
@@ -82,7 +90,7 @@ def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out
     names = _names(args.inputs, out)
     check_viewer(args.viewer, len(names))
     settings = {
-        "methods": args.methods,
+        "methods": [*args.methods, *_keys(args.variants)],
         "object": args.object,
         # With what is in them, so that --resume knows them again.
         "tables": [[str(path), content_hash(path)] for path in tables],
@@ -119,6 +127,16 @@ def _run(args: argparse.Namespace, console: Console, tables: Sequence[Path], out
             write_text(target, text(reports))
             console.note(str(target))
     return 0 if all(report["passed"] for report in reports) else 1
+
+
+def _keys(tried: Sequence[Variant]) -> list[str]:
+    """Raises WrongUse."""
+    for each in tried:
+        if each.method in WHOLE and each.method != BLENDER:
+            raise WrongUse(
+                f"--variants: {each.method} says nothing of its own: name a method with its stages"
+            )
+    return [each.key for each in tried]
 
 
 def _names(inputs: Sequence[str], out: Path) -> dict[Path, str]:

@@ -235,6 +235,14 @@ def is_key(name: str) -> bool:
     return "=" in name
 
 
+def name_of(name: str) -> str:
+    """Of a variant's key its name, or its text where it has none; a method's name as it is."""
+    if not is_key(name):
+        return name
+    variant = parse(name)
+    return variant.name or variant.text
+
+
 def named(variant: Variant, name: str) -> Variant:
     """The same under another name. Raises WrongUse for one that the text could not have."""
     if re.search(r"[=+:,\n]", name):

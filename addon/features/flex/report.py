@@ -8,6 +8,7 @@ from math import inf
 from typing import Any
 from xml.etree import ElementTree
 
+from ...skinning.variants import name_of
 from .verdict import by_cause
 
 Report = Mapping[str, Any]
@@ -104,7 +105,7 @@ def _by_cause(report: Report) -> list[tuple[_Found, list[_Found]]]:
 
 
 def _line(joint: str, finding: Report) -> str:
-    mends = f"; not under {', '.join(finding['mends'])}" if finding["mends"] else ""
+    mends = f"; not under {', '.join(map(name_of, finding['mends']))}" if finding["mends"] else ""
     return f"{joint}: {_text(finding)}{mends}"
 
 

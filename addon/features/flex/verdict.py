@@ -11,6 +11,7 @@ from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 
+from ...skinning.variants import name_of
 from ..measure.character import SAME_PATCH, Character, Place, share_in
 from ..measure.limits import Limit
 from ..measure.metrics import FrameOfRig
@@ -97,7 +98,7 @@ class Finding:
             joint, limit = self.caused_by
             return f"It comes from a fault of {joint}: {limit.label}. Mend that."
         if self.mends:
-            return f"Under {', '.join(self.mends)} it has this fault no more."
+            return f"Under {', '.join(map(name_of, self.mends))} it has this fault no more."
         return self.limit.advice
 
     def to_dict(self) -> dict[str, Any]:

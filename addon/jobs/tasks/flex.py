@@ -16,11 +16,12 @@ from ...features.flex import flex as bending
 from ...features.flex import page as flex_page
 from ...features.measure.limits import Table, read_table
 from ...io import files
+from ...skinning.variants import is_key, parse
 
 
 def flex(task: dict, report: Callable[..., None]) -> dict:
-    """Judges the file "source" of a task by its "settings": "tables", each with a hash; "methods" to try;
-    "object", only that mesh, or None; "viewer", a page to write, or None.
+    """Judges the file "source" of a task by its "settings": "tables", each with a hash; "methods" and keys of
+    variants to try; "object", only that mesh, or None; "viewer", a page to write, or None.
 
     "joints": as from Verdict.to_dict(); "left_out": a sentence for each mesh that could not be judged;
     "notes": remarks on the file. Raises SinewError where it cannot be judged.
@@ -31,12 +32,13 @@ def flex(task: dict, report: Callable[..., None]) -> dict:
     report("opening it")
     notes = files.open_file(path)
     scene, methods, page = bpy.context.scene, settings["methods"], settings["viewer"]
+    used = [parse(name).method if is_key(name) else name for name in methods]
     own_methods = {
         obj: properties.of(obj).method
         for obj in scene.objects
         if properties.has_sinew(obj) and properties.of(obj).enabled
     }
-    meshes, left_out = characters.deformable_meshes(scene, path, ["dq", *methods], settings["object"])
+    meshes, left_out = characters.deformable_meshes(scene, path, ["dq", *used], settings["object"])
     own: dict[bpy.types.Object, str | None] = {}
     for obj in meshes:
         # Linear blending may be left to the Armature modifier, where nothing could be bent.

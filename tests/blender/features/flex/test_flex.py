@@ -140,6 +140,10 @@ def test_the_command_says_what_is_wrong_where_and_what_mends_it(tmp_path):
     assert "Radius" in result.stdout
     assert "(twist 170)" in result.stdout
     assert "; not under dq" in result.stdout
+    tried = "--variants", "dq+delta_mush:iterations=2, Plain=lbs"
+    result = run_sinew("flex", good, "--poses", table, *tried, status=1)
+    assert "; not under dq+delta_mush:iterations=2" in result.stdout
+    assert "Plain" not in result.stdout
     run_sinew("flex", good, "--poses", table, "--thresholds", limits)
     before = good.read_bytes()
     page = tmp_path / "bent.html"
@@ -185,6 +189,8 @@ def test_wrong_use(tmp_path):
     path.write_text("[limits]\nlength = 3\n")
     for arguments, said in (
         (("--methods", "mush"), "expected one of"),
+        (("--variants", "dq+mush"), "expected one of"),
+        (("--variants", "file"), "says nothing of its own"),
         (("--poses", path), "limits.length"),
         (("--junit", tmp_path / "a.txt"), ".xml"),
         (("b.blend", "--viewer", tmp_path / "page.html"), "a single file"),
