@@ -12,7 +12,7 @@ import test_recommended
 from sinew_addon.attach import properties
 from sinew_addon.features.flex import feature as flex_feature
 from sinew_addon.features.measure import worst_frames
-from sinew_addon.features.measure.crossings import crossing_triangles
+from sinew_addon.features.measure.crossings import crossing_triangles, crossings
 from sinew_addon.features.measure.suggestion import CRITERIA, MEASURED, Suggestion
 from sinew_addon.features.suggest import recommend, suggest
 from sinew_addon.io import actions
@@ -93,6 +93,33 @@ def test_what_is_off_is_named():
     properties.of(obj).enabled = False
     with pytest.raises(RuntimeError, match="Arm is switched off"):
         bpy.ops.sinew.suggest()
+
+
+@pytest.mark.parametrize("stage", ["", "twist_spread", "delta_mush"])
+def test_intersections_are_counted_of_all_triangles(stage):
+    """Those that one bone moves as a whole cross as they do at rest, unless something else moves them."""
+    obj, armature = scenes.skinned_arm("dq")
+    scenes.forget_keys(armature)
+    bones = armature.pose.bones
+    for frame, degrees in ((1, 0.0), (4, 90.0)):
+        bones[1].rotation_mode = "XYZ"
+        scenes.key(bones[1], "rotation_euler", [(frame, (np.radians(2.0 * degrees), np.radians(degrees), 0.0))])
+    bpy.context.scene.frame_end = 4
+    # A part of the first bone is in another one at rest.
+    for vertex in obj.data.vertices[:8]:
+        vertex.co.z -= 0.15
+    if stage:
+        scenes.set_stage(obj, stage)
+    bpy.ops.sinew.suggest()
+    counts = set()
+    for method in sinew.methods():
+        worst = found().worst[method.name, "crossings"]
+        properties.of(obj).method = method.name
+        bpy.context.scene.frame_set(int(worst.frame))
+        measured = scenes.measure(obj).measured
+        assert worst.value == len(crossings(measured.shape) - crossings(measured.rest)), method.name
+        counts.add(worst.value)
+    assert len(counts) > 1
 
 
 def test_crossings_are_pairs_without_a_common_vertex():
