@@ -11,11 +11,12 @@ import sinew
 import test_recommended
 from sinew_addon.attach import properties
 from sinew_addon.features.flex import feature as flex_feature
-from sinew_addon.features.measure import worst_frames
+from sinew_addon.features.measure import live, worst_frames
 from sinew_addon.features.measure.crossings import crossing_triangles, crossings
 from sinew_addon.features.measure.suggestion import CRITERIA, MEASURED, Suggestion
 from sinew_addon.features.suggest import recommend, suggest
 from sinew_addon.io import actions
+from sinew_addon.skinning.variants import parse
 from sinew_addon.ui import stepped
 
 pytestmark = pytest.mark.long_term
@@ -103,7 +104,9 @@ def test_intersections_are_counted_of_all_triangles(stage):
     bones = armature.pose.bones
     for frame, degrees in ((1, 0.0), (4, 90.0)):
         bones[1].rotation_mode = "XYZ"
-        scenes.key(bones[1], "rotation_euler", [(frame, (np.radians(2.0 * degrees), np.radians(degrees), 0.0))])
+        scenes.key(
+            bones[1], "rotation_euler", [(frame, (np.radians(2.0 * degrees), np.radians(degrees), 0.0))]
+        )
     bpy.context.scene.frame_end = 4
     # A part of the first bone is in another one at rest.
     for vertex in obj.data.vertices[:8]:
@@ -120,6 +123,26 @@ def test_intersections_are_counted_of_all_triangles(stage):
         assert worst.value == len(crossings(measured.shape) - crossings(measured.rest)), method.name
         counts.add(worst.value)
     assert len(counts) > 1
+
+
+def test_what_one_bone_moves_is_asked_where_neighbours_or_stages_move_it():
+    obj, _armature = scenes.skinned_arm("dq")
+    bpy.context.scene.frame_set(11)
+    moment = live.Moment.of(live.measure_now([obj], properties.BLENDER, "measure"))
+    shapes = {method.name: moment.measured(method.name) for method in sinew.methods()}
+    groups = {name: suggest._moved_alike(moment, shapes["lbs"], shape) for name, shape in shapes.items()}
+    assert [name for name, bones in groups.items() if bones is None] == ["ddm"]
+    bones, triangles = groups["dq"], shapes["dq"].shape.surface.triangles
+    counts, heaviest = moment.pose.skin.influences.counts, moment.pose.skin.limb_of_vertices
+    is_whole = (counts[triangles] == 1).all(axis=1) & (np.ptp(heaviest[triangles], axis=1) == 0)
+    np.testing.assert_array_equal(bones, np.where(is_whole, heaviest[triangles[:, 0]], -1))
+    assert 0.1 < is_whole.mean() < 0.9
+    spread = moment.measured("dq", parse("dq+delta_mush:iterations=20").stage_values)
+    assert suggest._moved_alike(moment, shapes["lbs"], spread) is None
+    scenes.set_stage(obj, "twist_spread")
+    bpy.context.scene.frame_set(11)
+    staged = live.Moment.of(live.measure_now([obj], properties.BLENDER, "measure"))
+    assert suggest._moved_alike(staged, staged.measured("lbs"), staged.measured("dq")) is None
 
 
 def test_crossings_are_pairs_without_a_common_vertex():
