@@ -147,6 +147,7 @@ class SINEW_PT_variants(Sidebar, operators.OfSkinned, bpy.types.Panel):
         row.operator("sinew.contact_sheet", icon="IMGDISPLAY")
         row.operator("sinew.save_contact_sheet", text="", icon="EXPORT")
         row.operator("sinew.variant_keys", icon="LINENUMBERS_ON")
+        stepped.draw_progress(layout, "sinew.save_contact_sheet")
 
 
 def _current(context: bpy.types.Context) -> Variant:
