@@ -109,7 +109,10 @@ def _shrunk(values: np.ndarray, samples: np.ndarray, size: int) -> np.ndarray:
     """
     whole = np.zeros((size * SAMPLES) ** 2, np.float32)
     whole[samples] = values
-    return whole.reshape(size, SAMPLES, size, SAMPLES).mean(axis=(1, 3))
+    squares = whole.reshape(size, SAMPLES, size, SAMPLES)
+    # Several times as fast as their mean over two axes.
+    parts = [squares[:, row, :, column] for row in range(SAMPLES) for column in range(SAMPLES)]
+    return sum(parts[1:], parts[0]) / np.float32(SAMPLES * SAMPLES)
 
 
 def _vertex_normals(shape: Shape) -> np.ndarray:
@@ -139,43 +142,7 @@ def nearest(seen: np.ndarray, corners: np.ndarray, across: int) -> tuple[np.ndar
 
     seen  float64 [3, vertices]: places in samples, and heights towards the camera
     """
-    (ax, bx, cx), (ay, by, cy), (az, bz, cz) = seen[:, corners]
-    # From behind to the front: then most samples are right at once.
-    order = np.argsort(az + bz + cz)
-    ax, bx, cx, ay, by, cy, az, bz, cz = (each[order] for each in (ax, bx, cx, ay, by, cy, az, bz, cz))
-    whole = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
-    second = (cy - ay) / whole, (ax - cx) / whole
-    third = (ay - by) / whole, (bx - ax) / whole
-    low = [
-        np.ceil(np.minimum(np.minimum(*p[:2]), p[2])).clip(0, across - 1)
-        for p in ((ax, bx, cx), (ay, by, cy))
-    ]
-    high = [
-        np.floor(np.maximum(np.maximum(*p[:2]), p[2])).clip(0, across - 1)
-        for p in ((ax, bx, cx), (ay, by, cy))
-    ]
-    wide, tall = (np.maximum(b - a + 1, 0).astype(np.int64) for a, b in zip(low, high, strict=True))
-    counts = wide * tall
-    owner, number = owners_of(counts), items_of(np.zeros_like(counts), counts)
-    row = number // np.maximum(wide, 1)[owner]
-    column = number - row * wide[owner]
-    # Relative to a corner of the box, where single precision is enough.
-    x0, y0 = low[0] - ax, low[1] - ay
-    b0, c0 = second[0] * x0 + second[1] * y0, third[0] * x0 + third[1] * y0
-    rows = np.stack([b0, *second, c0, *third]).astype(np.float32)
-    b, bx_, by_, c, cx_, cy_ = rows[:, owner]
-    b += bx_ * column
-    b += by_ * row
-    c += cx_ * column
-    c += cy_ * row
-    is_in = (b >= -EDGE) & (c >= -EDGE) & (b + c <= 1.0 + EDGE)
-    owner, b, c = owner[is_in], b[is_in], c[is_in]
-    samples = (
-        (low[1].astype(np.int64)[owner] + row[is_in]) * across
-        + low[0].astype(np.int64)[owner]
-        + column[is_in]
-    )
-    height = (az[owner] + b * (bz - az)[owner] + c * (cz - az)[owner]).astype(np.float32)
+    samples, owner, shares, height = _covered(seen, corners, across)
     found = np.full(across * across, -1)
     left = np.arange(len(samples))
     while len(left):
@@ -184,8 +151,54 @@ def nearest(seen: np.ndarray, corners: np.ndarray, across: int) -> tuple[np.ndar
         left = left[height[left] > height[found[samples[left]]]]
     covered = np.flatnonzero(found >= 0)
     taken = found[covered]
-    b, c = b[taken], c[taken]
-    return covered, order[owner[taken]], np.stack([1.0 - b - c, b, c])
+    b, c = shares[:, taken]
+    return covered, owner[taken], np.stack([1.0 - b - c, b, c])
+
+
+def _covered(
+    seen: np.ndarray, corners: np.ndarray, across: int
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Returns the samples that triangles cover, from behind to the front; of each the triangle, the shares of
+    its second and third corner [2, n], and the height."""
+    (ax, bx, cx), (ay, by, cy), (az, bz, cz) = seen[:, corners]
+    # Then most samples are right at once.
+    order = np.argsort(az + bz + cz)
+    ax, bx, cx, ay, by, cy, az, bz, cz = (each[order] for each in (ax, bx, cx, ay, by, cy, az, bz, cz))
+    whole = (bx - ax) * (cy - ay) - (cx - ax) * (by - ay)
+    first_row, tall = _span(
+        np.ceil(np.minimum(np.minimum(ay, by), cy)), np.maximum(np.maximum(ay, by), cy), across
+    )
+    # Rows of samples; shares are linear along each.
+    owner = owners_of(tall)
+    y = items_of(first_row, tall)
+    slopes = [((cy - ay) / whole)[owner], ((ay - by) / whole)[owner]]
+    at_zero = [
+        ((ax - cx) / whole)[owner] * (y - ay[owner]) - slopes[0] * ax[owner],
+        ((bx - ax) / whole)[owner] * (y - ay[owner]) - slopes[1] * ax[owner],
+    ]
+    left, right = np.zeros(len(owner)), np.full(len(owner), across - 1.0)
+    for share, slope in zip((*at_zero, 1.0 - sum(at_zero)), (*slopes, -sum(slopes)), strict=True):
+        # Nothing of a row whose share is too small everywhere.
+        end = np.divide(
+            -EDGE - share, slope, out=np.where(share < -EDGE, np.inf, -np.inf), where=slope != 0.0
+        )
+        left = np.where(slope >= 0.0, np.maximum(left, end), left)
+        right = np.where(slope < 0.0, np.minimum(right, end), right)
+    first, wide = _span(np.ceil(left), right, across)
+    row, column = owners_of(wide), items_of(np.zeros_like(wide), wide)
+    b, c = (
+        (share + slope * first).astype(np.float32)[row] + slope.astype(np.float32)[row] * column
+        for share, slope in zip(at_zero, slopes, strict=True)
+    )
+    samples, owner = (y * across + first)[row] + column, owner[row]
+    height = (az[owner] + b * (bz - az)[owner] + c * (cz - az)[owner]).astype(np.float32)
+    return samples, order[owner], np.stack([b, c]), height
+
+
+def _span(first: np.ndarray, last: np.ndarray, across: int) -> tuple[np.ndarray, np.ndarray]:
+    """int64 [n]: the first samples from `first` to `last` that are in the picture, and how many there are."""
+    low, high = first.clip(0, across), np.floor(last).clip(-1, across - 1)
+    return low.astype(np.int64), (high - low + 1).clip(min=0).astype(np.int64)
 
 
 def _cavity(normals: np.ndarray, samples: np.ndarray, across: int) -> np.ndarray:
