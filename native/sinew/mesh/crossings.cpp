@@ -61,9 +61,9 @@ struct Place {
     auto operator<=>(const Place&) const = default;
 };
 
-constexpr std::size_t kMostInLeaf = 4;
-constexpr std::size_t kWorthAThread = 512;
-constexpr std::size_t kChunk = 64;
+constexpr std::size_t kMostInLeaf = 16;
+constexpr std::size_t kWorthAThread = 128;
+constexpr std::size_t kChunk = 16;
 
 /// Interleaves with two zeros the ten bits of `value`, 0 to 1.
 std::uint32_t spread_bits(double value) noexcept {
@@ -79,6 +79,15 @@ public:
     /// boxes  of triangles, by their place in the order
     Tree(std::span<const Box> boxes, std::span<const Place> order) : boxes_(boxes), order_(order) {
         nodes_.reserve(boxes.size());
+        for (int axis = 0; axis < 3; ++axis) {
+            for (const Box& box : boxes) {
+                lows_[axis].push_back(box.low[axis]);
+                highs_[axis].push_back(box.high[axis]);
+            }
+            // The last leaf is read as if it were full.
+            lows_[axis].resize(boxes.size() + kMostInLeaf);
+            highs_[axis].resize(boxes.size() + kMostInLeaf);
+        }
         if (!boxes.empty()) add(0, boxes.size());
     }
 
@@ -105,11 +114,22 @@ private:
 
     template <class Found>
     void visit_pairs(const Node& own, const Node& other, const Found& found) const {
+        const std::size_t count = other.end - other.begin;
         for (std::size_t place = own.begin; place < own.end; ++place) {
-            if (!meet(boxes_[place], other.box)) continue;
-            for (std::size_t behind = std::max(other.begin, place + 1); behind < other.end; ++behind) {
-                if (is_one_group(order_[place].group, order_[behind].group)) continue;
-                if (meet(boxes_[place], boxes_[behind])) found(place, behind);
+            const Box& box = boxes_[place];
+            if (!meet(box, other.box)) continue;
+            // Compilers make vectors of this loop, which has one length.
+            std::array<std::int32_t, kMostInLeaf> apart;
+            for (std::size_t k = 0; k < kMostInLeaf; ++k) {
+                apart[k] = 0;
+                for (int axis = 0; axis < 3; ++axis) {
+                    const float low = lows_[axis][other.begin + k], high = highs_[axis][other.begin + k];
+                    apart[k] |= (box.low[axis] > high) | (low > box.high[axis]);
+                }
+            }
+            for (std::size_t k = place < other.begin ? 0 : place + 1 - other.begin; k < count; ++k) {
+                if (apart[k] || is_one_group(order_[place].group, order_[other.begin + k].group)) continue;
+                found(place, other.begin + k);
             }
         }
     }
@@ -136,6 +156,8 @@ private:
     std::span<const Place> order_;
     std::vector<Node> nodes_;
     std::vector<std::size_t> leaves_;
+    // The boxes again, axis by axis.
+    std::array<std::vector<float>, 3> lows_, highs_;
 };
 
 /// Whether an edge of `a` meets `b`.
