@@ -288,8 +288,8 @@ def test_what_hangs_on_bones_goes_with_them(tmp_path):
 
 def test_the_page_is_one_file_that_says_what_it_lacks(tmp_path):
     make_character()
-    second, _armature = scenes.make_arm(name="Flat</script>")
-    second.scale.z = 0.0
+    _second, flat = scenes.make_arm(name="Flat</script>")
+    flat.scale.z = 0.0
     path = scenes.save(tmp_path / "arm.blend")
     page = write_page(path, "--methods", "lbs,qv,dq", "--frames", "1,6,11")
     text = page.read_text(encoding="utf-8")
