@@ -19,6 +19,7 @@ class Criterion:
     entry   of a metrics.Summary, or "" for what is counted separately; the nearer to 0 the better
     unit    "share", "length" or "count"
     praise  what the best method does
+    worse   what another does, so many times as the chosen one
     text    one sentence
     """
 
@@ -27,6 +28,7 @@ class Criterion:
     entry: str
     unit: str
     praise: str
+    worse: str
     text: str
 
 
@@ -37,6 +39,7 @@ CRITERIA = (
         "stretch_rms",
         "share",
         "stretches least",
+        "{method} stretches {times:.2g} times as much",
         "How evenly edges keep their length (RMS)",
     ),
     Criterion(
@@ -45,6 +48,7 @@ CRITERIA = (
         "limb_change",
         "share",
         "keeps volume best",
+        "{method} changes volume {times:.2g} times as much",
         "How much volume the limbs lose or gain, each by itself",
     ),
     Criterion(
@@ -53,6 +57,7 @@ CRITERIA = (
         "bulge_worst",
         "length",
         "bulges least",
+        "{method} bulges {times:.2g} times as far",
         "How far a vertex leaves or nears its bone's axis",
     ),
     Criterion(
@@ -61,6 +66,7 @@ CRITERIA = (
         "flipped_area",
         "share",
         "folds over least",
+        "{method} folds over {times:.2g} times as much",
         "How much of the surface is folded over",
     ),
     Criterion(
@@ -69,9 +75,12 @@ CRITERIA = (
         "",
         "count",
         "intersects itself least",
+        "{method} intersects itself {times:.2g} times as often",
         "How many triangles go through others that they do not at rest",
     ),
 )
+# Where it does nothing worse.
+ALIKE = (1.0, "{method} is as good by these measures")
 LONGEST = "longest"
 """The longest edge, as a part of its length at rest, by which torn shapes are found."""
 MEASURED = {**{c.name: c.entry for c in CRITERIA if c.entry}, LONGEST: "stretch_max"}
@@ -158,6 +167,17 @@ class Suggestion:
         """Returns the methods, the best at it first; then those that are torn; those without a value last."""
         known = self._magnitudes(criterion.name)
         return sorted(self.methods, key=lambda m: (m not in known, m in self.torn, known.get(m, 0.0)))
+
+    def why_not(self, method: str, chosen: str) -> Phrase:
+        """Returns why a method that is best at something was not chosen: what it does worst, against what was."""
+        worst = ALIKE
+        for criterion in CRITERIA:
+            known = self._magnitudes(criterion.name)
+            if method in known and chosen in known:
+                least = self._scaled(SAME[criterion.unit], criterion.unit)
+                times = (known[method] + least) / (known[chosen] + least)
+                worst = max(worst, (times, criterion.worse))
+        return phrase(worst[1], method=phrase(self.methods[method]), times=worst[0])
 
     @property
     def text(self) -> str:

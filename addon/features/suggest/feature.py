@@ -177,6 +177,11 @@ def _draw_best(layout: bpy.types.UILayout, suggestion: Suggestion, used: set[str
             column.label(text=tr("and {count} more", count=len(best) - MOST_BEST), translate=False)
         elif not best and (measured[0], criterion.name) in suggestion.worst:
             column.label(text="All alike")
+    chosen = recommend.choices[bpy.context.scene.session_uid].variant.method
+    row = suggest.RECOMMENDED if suggest.RECOMMENDED in suggestion.methods else chosen
+    firsts = {best[0] for best in map(suggestion.best, CRITERIA) if best and row not in best}
+    for method in sorted(firsts, key=list(suggestion.methods).index):
+        draw_text(layout, tr(suggestion.why_not(method, row)), icon="DOT")
 
 
 def _draw_order(

@@ -54,6 +54,17 @@ def test_rounding_is_no_bulge():
     assert suggestion(bulge=[[0.0], [0.0], [0.1]]).torn == {"c": "it bulges 10 times as far"}
 
 
+def test_what_is_not_chosen_has_a_reason():
+    """What it does worst against what was chosen; what is hardly anything in it does not count."""
+    made = suggestion(
+        stretch=[[0.1], [0.12]], volume=[[-0.3], [0.1]], bulge=[[0.0], [0.0]], crossings=[[0.0], [0.0]]
+    )
+    assert made.why_not("a", "b") == "Method A changes volume 3 times as much"
+    assert made.why_not("b", "a") == "Method B stretches 1.2 times as much"
+    assert suggestion(flips=[[0.1], [0.2]]).why_not("a", "b") == "Method A is as good by these measures"
+    assert suggestion(crossings=[[100.0], [4.0]]).why_not("a", "b").endswith("itself 22 times as often")
+
+
 def test_the_text_says_what_each_is_best_at():
     made = suggestion(
         stretch=[[0.1], [0.2], [0.2]], volume=[[0.2], [0.02], [0.04]], bulge=[[0.3], [0.1], [0.2]]
