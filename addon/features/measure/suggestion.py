@@ -169,7 +169,8 @@ class Suggestion:
         return sorted(self.methods, key=lambda m: (m not in known, m in self.torn, known.get(m, 0.0)))
 
     def why_not(self, method: str, chosen: str) -> Phrase:
-        """Returns why a method that is best at something was not chosen: what it does worst, against what was."""
+        """Returns why a method that is best at something was not chosen: what it does worst, against what
+        was."""
         worst = ALIKE
         for criterion in CRITERIA:
             known = self._magnitudes(criterion.name)
