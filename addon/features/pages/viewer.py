@@ -11,7 +11,14 @@ from types import MappingProxyType
 import bpy
 import numpy as np
 
-from ...attach import attach, properties, stage_settings, upstream_proxy, variant_settings
+from ...attach import (
+    attach,
+    corrective_smooth,
+    properties,
+    stage_settings,
+    upstream_proxy,
+    variant_settings,
+)
 from ...attach.layout import method_of
 from ...base.errors import SinewError
 from ...deform import characters, session, source
@@ -319,11 +326,15 @@ def _read(
     )
     is_whole = len(bound.skin_stack.skins) == 1 and bound.skin_stack.skins[0].mask is None
     is_shaded = is_whole and rule == BLENDER_4.name and SMOOTHING not in stage_values(settings)
+    # Blender's own smoothing behind it is Delta Mush.
+    is_plain = is_whole and not corrective_smooth.stage_values(obj_of_state)
 
     def is_recorded(name: str) -> bool:
         if is_key(name):
-            return not is_whole or name not in looks or SMOOTHING in variants[name].stages
-        return not (is_whole if name == BLENDER else is_shaded and name in (*METHODS, MIX))
+            variant = variants[name]
+            is_own = name in looks and (is_plain if variant.method == BLENDER else is_whole)
+            return not is_own or SMOOTHING in variant.stages
+        return not (is_plain if name == BLENDER else is_shaded and name in (*METHODS, MIX))
 
     return _Skinned(
         obj_of_state,

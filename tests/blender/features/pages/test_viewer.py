@@ -211,6 +211,23 @@ def test_what_the_shaders_lack_of_the_file_is_recorded(tmp_path):
     assert len([name for name in arrays if name.startswith("recorded_")]) == 5
 
 
+def test_a_corrective_smooth_that_sinew_takes_over_is_seen_under_the_armature_modifier(tmp_path):
+    obj = make_character()
+    smooth = obj.modifiers.new("Smooth", "CORRECTIVE_SMOOTH")
+    smooth.iterations = 12
+    expected = scenes.shapes(obj, FRAMES)
+    scenes.add_sinew(obj, "dq")
+    five_meshes.select(obj)
+    assert bpy.ops.sinew.take_over_smooth() == {"FINISHED"}
+    path = scenes.save(tmp_path / "arm.blend")
+    for words in (("--methods", "blender,dq"), ("--variants", "blender, dq")):
+        page = write_page(path, *words, "--frames", "1,6,11")
+        header, _meshes = read_page.read(page)
+        name = next(iter(header["methods"]))
+        assert_has_points(page, expected, name, obj)
+        assert header["parts"][0]["looks"][name]["recorded"]
+
+
 def test_recommended_is_a_method_with_its_stages(tmp_path):
     obj = make_character(bones=2)
     scenes.forget_keys(obj.parent)
