@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Measures what an artist waits for who chooses: Suggest over 30 frames, and the contact sheet.
 
-python bench/choosing.py: one line of JSON, of human.blend (SINEW_RIGS): seconds until the recommendation and
-until all methods are measured, and of a sheet of six variants; beside each the seconds of processor, which other
-programs change less. The least of three. Runs with the extension of an older checkout, too, without what that lacks.
+python bench/choosing.py: one line of JSON, of human.blend (SINEW_RIGS): seconds until the recommendation
+and until all methods are measured, and of a sheet of six variants; beside each the seconds of processor,
+which other programs change less. The least of three. Runs with the extension of an older checkout, too,
+without what that lacks.
 """
 
 from __future__ import annotations
