@@ -475,6 +475,7 @@ function show() {
     pane.textContent = shownLabel(name);
     pane.hidden = i >= state.panes;
     pane.style.left = `${100 * (i + 0.5) / state.panes}%`;
+    pane.style.maxWidth = `calc(${100 / state.panes}% - 24px)`;
   });
   find("stage").classList.toggle("has-two", viewCount() === 2);
   find("wipe").hidden = !isWiped();
