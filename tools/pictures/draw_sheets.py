@@ -153,6 +153,17 @@ def photograph_viewer(target: Path) -> None:
         photograph(page, target, 1180, 640)
 
 
+def photograph_sheet(target: Path) -> None:
+    """The page of a contact sheet, as it begins."""
+    variants = "blender, dq, cor, dq+twist_spread+delta_mush"
+    with tempfile.TemporaryDirectory() as place:
+        words = "--sheet", Path(place, "human.png"), "--viewer", Path(place, "human.html")
+        sinew("compare", find("human.blend"), "--variants", variants, *words)
+        photograph(Path(place, "human.html"), target, 1280, 780)
+    # Of few colours.
+    Image.open(target).convert("RGB").quantize(128, dither=Image.Dither.NONE).save(target, optimize=True)
+
+
 def photograph_flex(target: Path) -> None:
     """The page of a character that was bent, at a fault of a finger."""
     with tempfile.TemporaryDirectory() as place:
@@ -187,6 +198,7 @@ PICTURES: dict[str, Callable[[Path], None]] = {
     "batch-report.png": photograph_report,
     "page.png": photograph_page,
     "viewer.png": photograph_viewer,
+    "viewer-sheet.png": photograph_sheet,
     "viewer-flex.png": photograph_flex,
     "heat.png": photograph_heat_map,
     "elbows": draw_elbows,
