@@ -137,13 +137,15 @@ class Caps:
 class Parts:
     """Parts of a surface, each closed by fans where it ends.
 
-    surface   of all parts, which share no vertices
-    vertices  int64 [vertices], the numbers of its vertices in the whole surface
-    part_of   int64 [triangles], from 0
+    surface    of all parts, which share no vertices
+    vertices   int64 [vertices], the numbers of its vertices in the whole surface
+    triangles  int64 [triangles], the numbers of its triangles there
+    part_of    int64 [triangles], from 0
     """
 
     surface: Surface
     vertices: np.ndarray
+    triangles: np.ndarray
     part_of: np.ndarray
 
     @classmethod
@@ -159,7 +161,8 @@ class Parts:
             at_same_place = keys - vertices + whole.coincident[vertices]
         _keys, first, index = np.unique(at_same_place, return_index=True, return_inverse=True)
         no_edges = np.empty((0, 2), np.int32)
-        return cls(Surface(len(keys), corners.reshape(-1, 3), no_edges, first[index]), vertices, part_of)
+        surface = Surface(len(keys), corners.reshape(-1, 3), no_edges, first[index])
+        return cls(surface, vertices, np.flatnonzero(taken), part_of)
 
     @cached_property
     def _part_of_hole(self) -> np.ndarray:
@@ -169,13 +172,14 @@ class Parts:
         result[caps.holes] = of_vertices[caps.vertices]
         return result
 
-    def volumes(self, points: np.ndarray) -> np.ndarray:
-        """float64 [parts], for points [3, vertices] of the whole surface."""
+    def volumes(self, points: np.ndarray, normals: np.ndarray) -> np.ndarray:
+        """float64 [parts], for points [3, vertices] of the whole surface, with its normals [3, triangles], of
+        twice the triangles' areas."""
         own = points.take(self.vertices, axis=1)
         own -= own.mean(axis=1, keepdims=True) if len(self.vertices) else 0.0
-        a, b, c = (own.take(corner, axis=1) for corner in self.surface.corners)
+        heights = dots(own.take(self.surface.corners[0], axis=1), normals.take(self.triangles, axis=1))
         count = int(self.part_of.max(initial=-1)) + 1
-        inside = np.bincount(self.part_of, dots(a, cross(b, c)), count)
+        inside = np.bincount(self.part_of, heights, count)
         return (inside + np.bincount(self._part_of_hole, self.surface.caps.volumes(own), count)) / 6.0
 
 

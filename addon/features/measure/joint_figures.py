@@ -43,7 +43,8 @@ class Figures(NamedTuple):
         squares = float(np.nansum(values["stretch"] ** 2 * bent)) / of_all
         bones = np.unique(pose.skin.limb_of_triangles)
         taken = bent[bones[bones >= 0]] > 0.0
-        before, after = pose.rest_limbs[taken], pose.skin.limbs.volumes(measured.shape.points)[taken]
+        shape, before = measured.shape, pose.rest_limbs[taken]
+        after = pose.skin.limbs.volumes(shape.points, shape.normals)[taken]
         whole = float(np.abs(before).sum())
         girth = float(measured.rest_distances[pose.is_bent].mean()) if pose.is_bent.any() else 0.0
         return cls(

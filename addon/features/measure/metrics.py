@@ -368,7 +368,7 @@ class Pose:
     @cached_property
     def rest_limbs(self) -> np.ndarray:
         """float64 [limbs]: their volumes at rest."""
-        return self.skin.limbs.volumes(self.rest.points)
+        return self.skin.limbs.volumes(self.rest.points, self.rest.normals)
 
     @cached_property
     def is_bent(self) -> np.ndarray:
@@ -507,7 +507,8 @@ class Measured:
     @cached_property
     def _limb_changes(self) -> np.ndarray:
         """float64 [limbs]: the volume that each loses or gains."""
-        return np.abs(self.pose.skin.limbs.volumes(self.shape.points) - self.pose.rest_limbs)
+        after = self.pose.skin.limbs.volumes(self.shape.points, self.shape.normals)
+        return np.abs(after - self.pose.rest_limbs)
 
     @cached_property
     def limb_change(self) -> float:

@@ -24,6 +24,8 @@ RECOMMENDED = "recommended"
 """In Suggestion.methods: the recommended method with its stages, where it has any."""
 # The share of the time that the choice takes.
 CHOOSING = 0.5
+# Intersections take longest, and are most where most of the surface is bent: in so many frames they are counted.
+COUNTED = 6
 # How far apart methods may take a vertex of one bone, as a part of the diagonal: rounding.
 MOVED_ALIKE = 1e-5
 
@@ -59,7 +61,8 @@ def scan(scene: bpy.types.Scene, objects: Sequence[bpy.types.Object], over: str)
     recommend.keep(scene, choice, of_choice)
     drop_old(scene, objects)
     yield CHOOSING
-    counted = frames_to_count(frames)
+    counted = set(sorted(read, key=lambda frame: -read[frame].pose.bent_areas.sum())[:COUNTED])
+    counted = counted or frames_to_count(frames)
     labels = {method.name: method.label for method in sinew.methods()}
     suggestion = Suggestion(
         labels | ({RECOMMENDED: "Recommended"} if choice.variant.stages else {}), frames, 0.0

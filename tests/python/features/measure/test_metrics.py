@@ -179,10 +179,11 @@ def test_parts_are_slices(tube, is_cut):
         )
     surface = Surface(len(points), triangles, np.empty((0, 2), np.int32), coincident_vertices(points))
     area = SIDES / 2 * RADIUS**2 * np.sin(2 * np.pi / SIDES)
-    np.testing.assert_allclose(
-        Parts.of(surface, numbers).volumes(points.T), [0.5 * area, 1.25 * area], rtol=1e-9
-    )
-    assert Parts.of(surface, np.full(len(triangles), -1)).volumes(points.T).size == 0
+    shape = Shape(surface, points)
+    volumes = Parts.of(surface, numbers).volumes(shape.points, shape.normals)
+    np.testing.assert_allclose(volumes, [0.5 * area, 1.25 * area], rtol=1e-9)
+    nothing = Parts.of(surface, np.full(len(triangles), -1))
+    assert nothing.volumes(shape.points, shape.normals).size == 0
 
 
 def test_what_one_limb_gains_does_not_make_up_for_another(tube):
