@@ -24,7 +24,8 @@ RECOMMENDED = "recommended"
 """In Suggestion.methods: the recommended method with its stages, where it has any."""
 # The share of the time that the choice takes.
 CHOOSING = 0.5
-# Intersections take longest, and are most where most of the surface is bent: in so many frames they are counted.
+# Intersections take longest, and are most where most of the surface is bent: they are counted in so many
+# frames.
 COUNTED = 6
 # How far apart methods may take a vertex of one bone, as a part of the diagonal: rounding.
 MOVED_ALIKE = 1e-5
