@@ -36,7 +36,7 @@ Owned<Deformer::State> Deformer::State::alone(const BindData& data, const Method
 }
 
 BoneSets Deformer::State::wanted_sets() const {
-    const auto wants = [](const Kernel* kernel) { return kernel->set_rows != nullptr; };
+    const auto wants = [](const Kernel* kernel) { return kernel->has_rows_of_sets; };
     return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
 }
 
@@ -92,13 +92,13 @@ PreparedPose Deformer::State::prepare(const Pose& pose, const DeformOptions& opt
     const Bones bones{.used = packed->mesh.used_bones,
                       .stretched = packed->stretched_bones,
                       .rest_bones = packed->rest_bones,
+                      .pairs = &packed->mesh.pairs,
                       .sets = &sets,
                       .pose = pose};
     for (std::size_t k = 0; k < kernels_in_use().size(); ++k) {
         Palette& palette = reading.palette(k);
-        // Methods whose kernel can keep signs have that parameter first.
-        fill_palette(*kernels[k], packed->mesh.pairs, bones, Signs::are_kept(prepared.parameters[k]),
-                     palette);
+        const bool keeps_signs = Signs::are_kept(kMethods[methods[k]], prepared.parameters[k]);
+        kernels[k]->fill_palette[target_in_use()](bones, keeps_signs, palette);
         prepared.palettes[k] = &palette;
     }
     return prepared;
@@ -112,7 +112,7 @@ void Deformer::State::deform(const PreparedPose& pose, std::span<const Lanes<flo
         frames[k] = {.mesh = &mesh,
                      .rest_points = rest_points.data(),
                      .vertex_data = packed->vertex_data[methods[k]].get(),
-                     .bones = kernels[k]->set_rows != nullptr ? sets.entries.data() : mesh.bones.data(),
+                     .bones = kernels[k]->has_rows_of_sets ? sets.entries.data() : mesh.bones.data(),
                      .palette = pose.palettes[k],
                      .spaces = pose.space_rows.spaces(),
                      .parameters = pose.parameters[k].data(),

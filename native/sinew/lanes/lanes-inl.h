@@ -14,9 +14,26 @@
 #include "hwy/highway.h"
 #include "sinew/lanes/kernel.h"
 
+// Defines Method::kernel() from the static functions of a struct that is compiled for each instruction set. Further
+// arguments are other members of Kernel.
+#undef SINEW_KERNEL
+#if HWY_ONCE
+#define SINEW_KERNEL(Method, Struct, ...)                                                    \
+    namespace sinew {                                                                        \
+    const Kernel& Method::kernel() noexcept {                                                \
+        static constexpr Kernel kKernel{.deform = SINEW_TARGETS(Struct::deform),             \
+                                        .fill_palette = SINEW_TARGETS(Struct::fill_palette), \
+                                        .row_float4s = HWY_NAMESPACE::Struct::kNumbers / 4,  \
+                                        __VA_ARGS__};                                        \
+        return kKernel;                                                                      \
+    }                                                                                        \
+    }
+#else
+#define SINEW_KERNEL(Method, Struct, ...)
+#endif
+
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -200,7 +217,7 @@ HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, 
 /// operations.
 template <class D>
 HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
     // The estimate has at least 12 bits; one Newton step makes these all but the last two or three of 24.
     const auto root = hn::ApproximateReciprocalSqrt(x);
     const auto product = hn::Mul(x, root);
@@ -322,8 +339,6 @@ HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
     hn::StoreInterleaved3(p.x, p.y, p.z, d, to);
 }
 
-#if HWY_TARGET != HWY_SCALAR
-
 /// Not inlined into store_points, whose stack frame would grow for every block.
 template <class D>
 HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>* points, Vec<D> x, Vec<D> y,
@@ -346,8 +361,6 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
         std::memcpy(to + 2, &third, sizeof(third));
     }
 }
-
-#endif
 
 #endif
 
@@ -381,8 +394,7 @@ HWY_INLINE bool is_summed_absolutely(const Palette& palette, const std::int32_t*
            sinew::needs_absolute_sum(palette, bones, count);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -21,14 +21,14 @@ struct PaletteStore::Palettes {
     }
 
     void add(const Kernel& kernel, std::size_t bones, std::size_t entries, std::size_t k) {
-        const std::size_t rows = kernel.row_count(bones, entries);
-        const std::size_t scaled_rows = kernel.keeps_scale() ? rows : 0;
+        const std::size_t rows = kernel.has_rows_of_sets ? entries : bones;
+        const std::size_t scaled_rows = kernel.keeps_scale ? rows : 0;
         // A bone may be listed twice as scaled: because of its rest axes, and because of its pose.
-        const std::size_t scaled_bones = kernel.keeps_scale() ? 2 * bones : 0;
-        const std::size_t posed_bones = kernel.set_rows != nullptr ? bones : 0;
-        std::array<std::size_t, 7> sizes{kernel.rest_row.size() * rows * sizeof(Float4),
+        const std::size_t scaled_bones = kernel.keeps_scale ? 2 * bones : 0;
+        const std::size_t rigid_bones = kernel.has_rows_of_sets ? bones : 0;
+        std::array<std::size_t, 7> sizes{kernel.row_float4s * rows * sizeof(Float4),
                                          kDisplacementRows * scaled_rows * sizeof(Float4),
-                                         posed_bones * sizeof(PosedBone),
+                                         rigid_bones * sizeof(RigidBone),
                                          (rows + kSizesAtOnce) * sizeof(float),
                                          scaled_bones * sizeof(std::int32_t),
                                          rows,
@@ -42,7 +42,7 @@ struct PaletteStore::Palettes {
         Palette& palette = of_kernels[k];
         palette.bones = reinterpret_cast<Float4*>(next());
         palette.scales = reinterpret_cast<Float4*>(next());
-        palette.posed = reinterpret_cast<PosedBone*>(next());
+        palette.rigid_bones = reinterpret_cast<RigidBone*>(next());
         palette.sizes = reinterpret_cast<float*>(next());
         palette.scaled = reinterpret_cast<std::int32_t*>(next());
         palette.may_need_absolute_sum = reinterpret_cast<std::uint8_t*>(next());

@@ -21,8 +21,7 @@
 #include "sinew/lanes/bones-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// A row of numbers for each bone, which are summed by weights. A row's first four numbers are the quaternion, or
 /// numbers without a sign. Numbers after the first kRow are the same in all rows of a set of bones, except in
@@ -30,6 +29,8 @@ namespace HWY_NAMESPACE {
 ///
 /// kNumbers        numbers in a row, a multiple of 4
 /// kSignedFloat4s  how many Float4 of a row change sign with the quaternion: 0 to 2
+/// write_row       writes the numbers of rigid motions, one in each lane (not for rows of sets)
+/// write_scale     writes the Palette::scales of a bone, of what add_scale reads
 /// add_scale       adds the effect of a bone's scale to a sum, with the weight and with the weight that has the sign
 ///                 of the row
 template <class Rows>
@@ -139,8 +140,6 @@ HWY_INLINE void subtract_first(float* rows, std::size_t count) {
     }
 }
 
-#if HWY_TARGET != HWY_SCALAR
-
 /// The dot product in every lane, rounded as by the scalar dot().
 HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
     const Vec<Four> product = hn::Mul(a, b);
@@ -181,27 +180,6 @@ HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones,
     }
     return hn::GetLane(least);
 }
-
-#else
-
-template <class Rigid, bool kDifferences>
-float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
-    float least = 1.0f;
-    for (std::size_t k = 0; k < count; ++k) {
-        float* const row = rows + Rigid::kNumbers * k;
-        std::memcpy(row, &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])],
-                    sizeof(Float4) * kRowFloat4s<Rigid>);
-        const float cosine = dot(row, rows);
-        least = std::min(least, std::abs(cosine));
-        if (cosine < 0.0f && !palette.keeps_signs) {
-            for (std::size_t i = 0; i < 4 * Rigid::kSignedFloat4s; ++i) row[i] = -row[i];
-        }
-    }
-    if (kDifferences) subtract_first<Rigid::kNumbers>(rows, count);
-    return least;
-}
-
-#endif
 
 /// Copies the first bone of a set to `rows`, and the others or, if kDifferences, their differences from it, each with
 /// the sign with which it is added. Returns false if a sign depends on the weights, or if a bone has scale and
@@ -464,7 +442,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Deforms a block whose vertices have own bones one by one: for bones with scale, or without vectors.
+/// Deforms a block whose vertices have own bones one by one: for bones with scale.
 template <class Rigid>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
@@ -483,8 +461,6 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
     }
 }
-
-#if HWY_TARGET != HWY_SCALAR
 
 /// Blends one vertex that has its own bones. A bone's row is added as it is in memory, Float4 by Float4.
 ///
@@ -547,15 +523,6 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
     }
 }
 
-#else
-
-template <class Rigid, bool>
-void deform_own_bones(const Frame& frame, std::size_t b) {
-    deform_one_by_one<Rigid>(frame, b);
-}
-
-#endif
-
 template <RigidKernel Rigid>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
     const auto of_block = frame.palette->any_scale     ? &deform_one_by_one<Rigid>
@@ -567,17 +534,18 @@ void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
         [&](std::size_t b) HWY_ATTR { of_block(frame, b); });
 }
 
-// Defines the functions of a kernel that are compiled for each instruction set, for one that is deform_rigid().
-#ifndef SINEW_RIGID_FUNCTIONS
-#define SINEW_RIGID_FUNCTIONS(Rows)                                       \
-    void deform(const Frame& frame, std::size_t begin, std::size_t end) { \
-        deform_rigid<Rows>(frame, begin, end);                            \
-    }                                                                     \
-    void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<Rows>(bones, palette); }
-#endif
+/// The functions of a kernel for a method that blends rotations.
+template <class Method, class Rows>
+struct RigidFunctions {
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        deform_rigid<Rows>(frame, begin, end);
+    }
+    static void fill_palette(const Bones& bones, bool keeps_signs, Palette& palette) {
+        fill_rigid<Method, Rows>(bones, keeps_signs, palette);
+    }
+};
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

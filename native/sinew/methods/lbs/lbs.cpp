@@ -1,40 +1,27 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Linear blending on lanes. A bone is the columns x, y, z and translation of its displacement, each followed by a
 // 0. Bones are summed as described at Palette.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/lbs/lbs.h"
 
 #include <cstring>
 #include <limits>
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/kernel.h"
 #include "sinew/transform/convert.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/lbs/lbs.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/lbs/lbs.cpp"
+#include "sinew/base/each_target.h"
 #include "sinew/lanes/block_loop-inl.h"
-
-namespace sinew {
-
-/// Kernel::bone_rows for bones that are posed in any space, in double.
-void linear_rows_between_spaces(const Bones& bones, Palette& palette);
-
-}  // namespace sinew
+#include "sinew/lanes/bones-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 namespace {
 
 /// Returns `v`, and keeps GCC from loading it again for each of its uses. On AVX-512, where the kernel is bound
 /// by loads, the reloads cost a tenth of its time.
 template <class V>
 HWY_INLINE V in_register(V v) {
-#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_SCALAR
+#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_EMU128
     asm("" : "+v"(v.raw));
 #endif
     return v;
@@ -192,8 +179,6 @@ inline void deform_absolute_set(const Frame& frame, std::size_t begin, std::size
                    [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k - 1])}; });
 }
 
-#if HWY_TARGET != HWY_SCALAR
-
 /// Deforms one vertex, with x, y and z in the lanes: its operations are those of a vertex in deform_lanes(), in their order.
 ///
 /// rest     the vertex's rest point: numbers kLanes apart
@@ -240,31 +225,6 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     }
 }
 
-#else
-
-inline void deform_own_bones(const Frame& frame, std::size_t b) {
-    const One d;
-    const MeshPointers pointers = pointers_of(frame);
-    const Block& block = pointers.blocks[b];
-    const float* const weights = weights_of(pointers, b);
-    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
-        const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
-        const bool is_absolute = is_summed_absolutely(*frame.palette, bones, block.influences);
-        const Points<One> p = load_points(d, pointers, b, lane);
-        Points<One> sum = p;
-        const float* const first = is_absolute ? kNoColumns : columns_of_bone(frame, bones[0]);
-        Vec<One> weight = hn::Zero(d);
-        add_bone<1, false>(d, Columns{first}, &weight, &p, &sum);
-        for (std::size_t k = is_absolute ? 0 : 1; k < block.influences; ++k) {
-            weight = hn::Load(d, weights + kLanes * k + lane);
-            add_bone<1, true>(d, Differences{columns_of_bone(frame, bones[k]), first}, &weight, &p, &sum);
-        }
-        store_points(d, pointers, b, lane, sum);
-    }
-}
-
-#endif
-
 void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     const Block& block = frame.mesh->blocks[begin];
     if (is_summed_absolutely(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
@@ -284,23 +244,14 @@ void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void deform(const Frame& frame, std::size_t begin, std::size_t end) {
-    for_each_set(
-        frame, begin, end, [&](std::size_t b, std::size_t after) HWY_ATTR { deform_sets(frame, b, after); },
-        [&](std::size_t b) HWY_ATTR { deform_own_bones(frame, b); });
-}
-
-#if HWY_TARGET != HWY_SCALAR
-
 /// Writes the columns of each bone's displacement.
 void rows_in_model(const Bones& bones, Palette& palette) {
-    const std::span<const std::int32_t> used = bones.used;
     const hn::CappedTag<float, 4> d;
     const auto three = hn::FirstN(d, 3);
     // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-    for (std::size_t i = 0; i < used.size(); ++i) {
-        const float* const from = &bones.pose.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+    for (std::size_t i = 0; i < bones.used.size(); ++i) {
+        const float* const from = &bones.motion(i).linear[0].x;
         float* const to = palette.bones[kLbsColumns * i].value.data();
         auto squares = hn::Zero(d);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -319,35 +270,15 @@ void rows_in_model(const Bones& bones, Palette& palette) {
     }
 }
 
-#else
-
-void rows_in_model(const Bones& bones, Palette& palette) { linear_rows_between_spaces(bones, palette); }
-
-#endif
-
-void bone_rows(const Bones& bones, Palette& palette) {
-    is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
-                                             : linear_rows_between_spaces(bones, palette);
-}
-
-}  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
-HWY_AFTER_NAMESPACE();
-
-#if HWY_ONCE
-namespace sinew {
-
-static constexpr Float4 kRestRow[HWY_NAMESPACE::kLbsColumns] = {};
-
-void linear_rows_between_spaces(const Bones& bones, Palette& palette) {
+/// Writes them for bones that are posed in another space, in double.
+void rows_between_spaces(const Bones& bones, Palette& palette) {
     const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
     const Affine<double> model_from_bones = inverse(bones_from_model);
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
-        const Affine<float>& posed = bones.pose.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
-        const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
+        Affine<double> motion;
+        if (bones.is_posed(i)) motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
         const Mat3<double> m = motion.linear - Mat3<double>(1.0);
-        Float4* const columns = &palette.bones[std::size(kRestRow) * i];
+        Float4* const columns = &palette.bones[kLbsColumns * i];
         for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
         const Vec3<double>& translation = motion.translation;
         columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
@@ -356,7 +287,27 @@ void linear_rows_between_spaces(const Bones& bones, Palette& palette) {
     }
 }
 
-SINEW_KERNEL(Lbs, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows))
+}  // namespace
 
-}  // namespace sinew
-#endif
+struct LbsKernel {
+    static constexpr std::size_t kNumbers = kColumns;
+
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        for_each_set(
+            frame, begin, end,
+            [&](std::size_t b, std::size_t after) HWY_ATTR { deform_sets(frame, b, after); },
+            [&](std::size_t b) HWY_ATTR { deform_own_bones(frame, b); });
+    }
+
+    static void fill_palette(const Bones& bones, bool, Palette& palette) {
+        palette.any_scale = palette.keeps_signs = false;
+        is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
+                                                 : rows_between_spaces(bones, palette);
+        find_absolute_sums(bones, palette);
+    }
+};
+
+}  // namespace sinew::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+SINEW_KERNEL(Lbs, LbsKernel, .keeps_scale = false)

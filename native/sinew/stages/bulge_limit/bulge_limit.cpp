@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "sinew/base/targets.h"
 #include "sinew/stages/stage_state.h"
 #include "sinew/transform/split_scale.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/stages/bulge_limit/bulge_limit.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/stages/bulge_limit/bulge_limit.cpp"
+#include "sinew/base/each_target.h"
 #include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/gather-inl.h"
 
@@ -44,8 +39,7 @@ struct BulgeFrame : StageFrame {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// The point of the bone's segment nearest to `p`.
 template <class D>
@@ -221,8 +215,7 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end,
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -1,26 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The stage `delta_mush` on whole chunks: see stages/delta_mush/delta_mush.h for the definition.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 
-#include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 #include "sinew/stages/delta_mush/mush_mesh.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/stages/delta_mush/mush_kernel.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/stages/delta_mush/mush_kernel.cpp"
+#include "sinew/base/each_target.h"
 #include "sinew/lanes/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 constexpr float kRootOfTwo = 1.41421356237f;
 
@@ -114,28 +108,6 @@ void smooth(const MushFrame& frame, std::size_t begin, std::size_t end) {
 /// across quarters. Shorter vectors use the same order, since the details are stored in it.
 HWY_INLINE std::size_t vertex_of(std::size_t lane) { return 4 * (lane % 4) + lane / 4; }
 
-#if HWY_TARGET == HWY_SCALAR
-
-/// Points for the lanes from `lane` on, for a batch of kLanes consecutive vertices.
-template <class D>
-HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
-    const float* const numbers = numbers_of(points + vertex_of(lane));
-    return in_all_lanes(d, numbers);
-}
-
-/// One point for each lane, from anywhere: index_of(vertex) returns the index of the point.
-template <class D, class Index>
-HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
-    return consecutive_points(d, points + static_cast<std::size_t>(index_of(vertex_of(lane))), 0);
-}
-
-template <class D>
-HWY_INLINE void store_lanes(D, const Points<D>& p, Float4* to, std::size_t lane) {
-    to[vertex_of(lane)] = {{hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z), 0.0f}};
-}
-
-#else
-
 /// The first halves of all quarters, alternating between `a` and `b`.
 template <class D>
 HWY_INLINE Vec<D> first_halves(D d, Vec<D> a, Vec<D> b) {
@@ -196,8 +168,6 @@ HWY_INLINE void store_lanes(D d, const Points<D>& p, Float4* to, std::size_t lan
     hn::StoreU(first_halves(d, xy_high, z_high), d, numbers + 32);
     hn::StoreU(second_halves(d, xy_high, z_high), d, numbers + 48);
 }
-
-#endif
 
 /// 1 / length of a vector, from its square; 0 if the vector has no direction.
 template <class D>
@@ -365,7 +335,7 @@ void take_details(const MushFrame& frame, std::size_t begin, std::size_t end) {
 /// sqrt(x) for x >= 0. For x below any relevant squared length, some similarly small number.
 template <class D>
 HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
     // As in inverse_root().
     x = hn::Max(x, hn::Set(d, 1e-37f));
     const auto inverse = hn::ApproximateReciprocalSqrt(x);
@@ -380,7 +350,7 @@ HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
 /// 1 / x for positive x. A division takes as long as the root.
 template <class D>
 HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
     const auto estimate = hn::ApproximateReciprocal(x);
     return hn::Mul(estimate, hn::NegMulAdd(x, estimate, hn::Set(d, 2.0f)));
 #else
@@ -484,8 +454,7 @@ void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

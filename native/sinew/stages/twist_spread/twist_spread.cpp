@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/stages/twist_spread/twist_spread.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "sinew/base/targets.h"
 #include "sinew/stages/stage_state.h"
 #include "sinew/transform/split_scale.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/stages/twist_spread/twist_spread.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/stages/twist_spread/twist_spread.cpp"
+#include "sinew/base/each_target.h"
 #include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/gather-inl.h"
@@ -84,8 +79,7 @@ struct TwistFrame : StageFrame {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// Sine and 1 - cosine of an angle.
 template <class D>
@@ -287,8 +281,7 @@ void measure(const TwistFrame& frame, std::span<const TwistRest> at_rest, std::s
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
