@@ -14,6 +14,8 @@
 HWY_BEFORE_NAMESPACE();
 namespace sinew::HWY_NAMESPACE {
 
+#if HWY_TARGET != HWY_SCALAR
+
 /// Loads a point into the first three lanes.
 ///
 /// kIsLast  nothing may be read behind the point
@@ -50,10 +52,13 @@ HWY_INLINE Vec<D> rows(D d, const Point* points, const std::int32_t* vertices) {
     }
 }
 
+#endif
+
 /// One point for each lane. Whole points are read and then transposed: a gather of each number takes several times
 /// as long on some processors.
 template <bool kIsLast, class D, class Point>
 HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* vertices) {
+#if HWY_TARGET != HWY_SCALAR
     if constexpr (hn::MaxLanes(D()) >= 4) {
         const hn::RepartitionToWide<D> pairs;
         const auto r0 = rows<kIsLast>(d, points, vertices);
@@ -68,6 +73,7 @@ HWY_INLINE Points<D> points_of(D d, const Point* points, const std::int32_t* ver
                 hn::BitCast(d, hn::InterleaveUpper(pairs, xy01, xy23)),
                 hn::BitCast(d, hn::InterleaveLower(pairs, z01, z23))};
     }
+#endif
     return load_consecutive(d, reinterpret_cast<const float*>(points + *vertices));
 }
 

@@ -217,7 +217,7 @@ HWY_INLINE Points<D> add_rotation(D d, const Points<D>& start, const Vec<D>* q, 
 /// operations.
 template <class D>
 HWY_INLINE Vec<D> inverse_root(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
     // The estimate has at least 12 bits; one Newton step makes these all but the last two or three of 24.
     const auto root = hn::ApproximateReciprocalSqrt(x);
     const auto product = hn::Mul(x, root);
@@ -339,6 +339,8 @@ HWY_INLINE void store_consecutive(D d, const Points<D>& p, float* to) {
     hn::StoreInterleaved3(p.x, p.y, p.z, d, to);
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
 /// Not inlined into store_points, whose stack frame would grow for every block.
 template <class D>
 HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>* points, Vec<D> x, Vec<D> y,
@@ -361,6 +363,8 @@ HWY_NOINLINE void scatter_points(D d, const std::int32_t* vertices, Vec3<float>*
         std::memcpy(to + 2, &third, sizeof(third));
     }
 }
+
+#endif
 
 #endif
 

@@ -140,6 +140,8 @@ HWY_INLINE void subtract_first(float* rows, std::size_t count) {
     }
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
 /// The dot product in every lane, rounded as by the scalar dot().
 HWY_INLINE Vec<Four> dot(Vec<Four> a, Vec<Four> b) {
     const Vec<Four> product = hn::Mul(a, b);
@@ -180,6 +182,27 @@ HWY_INLINE float copy_aligned(const Palette& palette, const std::int32_t* bones,
     }
     return hn::GetLane(least);
 }
+
+#else
+
+template <class Rigid, bool kDifferences>
+float copy_aligned(const Palette& palette, const std::int32_t* bones, std::size_t count, float* rows) {
+    float least = 1.0f;
+    for (std::size_t k = 0; k < count; ++k) {
+        float* const row = rows + Rigid::kNumbers * k;
+        std::memcpy(row, &palette.bones[kRowFloat4s<Rigid> * static_cast<std::size_t>(bones[k])],
+                    sizeof(Float4) * kRowFloat4s<Rigid>);
+        const float cosine = dot(row, rows);
+        least = std::min(least, std::abs(cosine));
+        if (cosine < 0.0f && !palette.keeps_signs) {
+            for (std::size_t i = 0; i < 4 * Rigid::kSignedFloat4s; ++i) row[i] = -row[i];
+        }
+    }
+    if (kDifferences) subtract_first<Rigid::kNumbers>(rows, count);
+    return least;
+}
+
+#endif
 
 /// Copies the first bone of a set to `rows`, and the others or, if kDifferences, their differences from it, each with
 /// the sign with which it is added. Returns false if a sign depends on the weights, or if a bone has scale and
@@ -442,7 +465,7 @@ void deform_set(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Deforms a block whose vertices have own bones one by one: for bones with scale.
+/// Deforms a block whose vertices have own bones one by one: for bones with scale, or without vectors.
 template <class Rigid>
 void deform_one_by_one(const Frame& frame, std::size_t b) {
     const One d;
@@ -461,6 +484,8 @@ void deform_one_by_one(const Frame& frame, std::size_t b) {
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, rest);
     }
 }
+
+#if HWY_TARGET != HWY_SCALAR
 
 /// Blends one vertex that has its own bones. A bone's row is added as it is in memory, Float4 by Float4.
 ///
@@ -522,6 +547,15 @@ void deform_own_bones(const Frame& frame, std::size_t b) {
         finish_and_store<Rigid>(d, pointers, spaces, b, lane, sum, load_rest(d, pointers, spaces, b, lane));
     }
 }
+
+#else
+
+template <class Rigid, bool>
+void deform_own_bones(const Frame& frame, std::size_t b) {
+    deform_one_by_one<Rigid>(frame, b);
+}
+
+#endif
 
 template <RigidKernel Rigid>
 void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {

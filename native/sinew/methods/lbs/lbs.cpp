@@ -21,7 +21,7 @@ namespace {
 /// by loads, the reloads cost a tenth of its time.
 template <class V>
 HWY_INLINE V in_register(V v) {
-#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_COMPILER_GCC_ACTUAL && HWY_TARGET != HWY_SCALAR
     asm("" : "+v"(v.raw));
 #endif
     return v;
@@ -179,6 +179,8 @@ inline void deform_absolute_set(const Frame& frame, std::size_t begin, std::size
                    [&](std::size_t k) HWY_ATTR { return Columns{columns_of_bone(frame, bones[k - 1])}; });
 }
 
+#if HWY_TARGET != HWY_SCALAR
+
 /// Deforms one vertex, with x, y and z in the lanes: its operations are those of a vertex in deform_lanes(), in their order.
 ///
 /// rest     the vertex's rest point: numbers kLanes apart
@@ -225,6 +227,31 @@ inline void deform_own_bones(const Frame& frame, std::size_t b) {
     }
 }
 
+#else
+
+inline void deform_own_bones(const Frame& frame, std::size_t b) {
+    const One d;
+    const MeshPointers pointers = pointers_of(frame);
+    const Block& block = pointers.blocks[b];
+    const float* const weights = weights_of(pointers, b);
+    for (std::size_t lane = 0; lane < block.vertices; ++lane) {
+        const std::int32_t* const bones = &frame.mesh->bones[block.first_bone + lane * block.influences];
+        const bool is_absolute = is_summed_absolutely(*frame.palette, bones, block.influences);
+        const Points<One> p = load_points(d, pointers, b, lane);
+        Points<One> sum = p;
+        const float* const first = is_absolute ? kNoColumns : columns_of_bone(frame, bones[0]);
+        Vec<One> weight = hn::Zero(d);
+        add_bone<1, false>(d, Columns{first}, &weight, &p, &sum);
+        for (std::size_t k = is_absolute ? 0 : 1; k < block.influences; ++k) {
+            weight = hn::Load(d, weights + kLanes * k + lane);
+            add_bone<1, true>(d, Differences{columns_of_bone(frame, bones[k]), first}, &weight, &p, &sum);
+        }
+        store_points(d, pointers, b, lane, sum);
+    }
+}
+
+#endif
+
 void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     const Block& block = frame.mesh->blocks[begin];
     if (is_summed_absolutely(*frame.palette, &frame.mesh->bones[block.first_bone], block.influences)) {
@@ -244,7 +271,26 @@ void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-/// Writes the columns of each bone's displacement.
+/// Writes the columns of each bone's displacement, for bones that are posed in any space, in double.
+void rows_between_spaces(const Bones& bones, Palette& palette) {
+    const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
+    const Affine<double> model_from_bones = inverse(bones_from_model);
+    for (std::size_t i = 0; i < bones.used.size(); ++i) {
+        Affine<double> motion;
+        if (bones.is_posed(i)) motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
+        const Mat3<double> m = motion.linear - Mat3<double>(1.0);
+        Float4* const columns = &palette.bones[kLbsColumns * i];
+        for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
+        const Vec3<double>& translation = motion.translation;
+        columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
+        palette.sizes[i] =
+            size_of(translation, glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+    }
+}
+
+#if HWY_TARGET != HWY_SCALAR
+
+/// Writes them for bones that are posed in model space.
 void rows_in_model(const Bones& bones, Palette& palette) {
     const hn::CappedTag<float, 4> d;
     const auto three = hn::FirstN(d, 3);
@@ -270,22 +316,11 @@ void rows_in_model(const Bones& bones, Palette& palette) {
     }
 }
 
-/// Writes them for bones that are posed in another space, in double.
-void rows_between_spaces(const Bones& bones, Palette& palette) {
-    const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
-    const Affine<double> model_from_bones = inverse(bones_from_model);
-    for (std::size_t i = 0; i < bones.used.size(); ++i) {
-        Affine<double> motion;
-        if (bones.is_posed(i)) motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
-        const Mat3<double> m = motion.linear - Mat3<double>(1.0);
-        Float4* const columns = &palette.bones[kLbsColumns * i];
-        for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
-        const Vec3<double>& translation = motion.translation;
-        columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
-        palette.sizes[i] =
-            size_of(translation, glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
-    }
-}
+#else
+
+void rows_in_model(const Bones& bones, Palette& palette) { rows_between_spaces(bones, palette); }
+
+#endif
 
 }  // namespace
 

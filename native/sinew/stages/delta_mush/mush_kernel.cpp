@@ -108,6 +108,28 @@ void smooth(const MushFrame& frame, std::size_t begin, std::size_t end) {
 /// across quarters. Shorter vectors use the same order, since the details are stored in it.
 HWY_INLINE std::size_t vertex_of(std::size_t lane) { return 4 * (lane % 4) + lane / 4; }
 
+#if HWY_TARGET == HWY_SCALAR
+
+/// Points for the lanes from `lane` on, for a batch of kLanes consecutive vertices.
+template <class D>
+HWY_INLINE Points<D> consecutive_points(D d, const Float4* points, std::size_t lane) {
+    const float* const numbers = numbers_of(points + vertex_of(lane));
+    return in_all_lanes(d, numbers);
+}
+
+/// One point for each lane, from anywhere: index_of(vertex) returns the index of the point.
+template <class D, class Index>
+HWY_INLINE Points<D> collected_points(D d, const Float4* points, const Index& index_of, std::size_t lane) {
+    return consecutive_points(d, points + static_cast<std::size_t>(index_of(vertex_of(lane))), 0);
+}
+
+template <class D>
+HWY_INLINE void store_lanes(D, const Points<D>& p, Float4* to, std::size_t lane) {
+    to[vertex_of(lane)] = {{hn::GetLane(p.x), hn::GetLane(p.y), hn::GetLane(p.z), 0.0f}};
+}
+
+#else
+
 /// The first halves of all quarters, alternating between `a` and `b`.
 template <class D>
 HWY_INLINE Vec<D> first_halves(D d, Vec<D> a, Vec<D> b) {
@@ -169,10 +191,12 @@ HWY_INLINE void store_lanes(D d, const Points<D>& p, Float4* to, std::size_t lan
     hn::StoreU(second_halves(d, xy_high, z_high), d, numbers + 48);
 }
 
+#endif
+
 /// 1 / length of a vector, from its square; 0 if the vector has no direction.
 template <class D>
 HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
-    const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushStage::kShortest)));
+    const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushDefinition::kShortest)));
     return hn::IfThenElseZero(is_long, inverse_root(d, squared));
 }
 
@@ -214,7 +238,7 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     corner.unit_z = hn::Add(half_unit_z, half_unit_z);
     corner.unit_y = hn::Mul(half_unit_z, length_x);
 
-    // DeltaMushStage::angle() of the cosine c = a b. (a + b)^2 = 2 + 2 c and (a - b)^2 = 2 - 2 c, so the smaller
+    // DeltaMushDefinition::angle() of the cosine c = a b. (a + b)^2 = 2 + 2 c and (a - b)^2 = 2 - 2 c, so the smaller
     // is 2 (1 - |c|), and the polynomial's factor is the square root of half of it. If an edge has no direction,
     // c is 0.
     const auto least = hn::IfThenElse(are_two, hn::Min(squared_x, squared_y), hn::Set(d, 2.0f));
@@ -227,7 +251,7 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     const auto is_negative = hn::Lt(squared_x, squared_y);
     const auto angle = hn::IfThenElse(is_negative, hn::Sub(hn::Set(d, 3.14159265358979f), of_size), of_size);
     const auto largest = hn::Max(hn::Abs(corner.y.x), hn::Max(hn::Abs(corner.y.y), hn::Abs(corner.y.z)));
-    const auto is_bent = hn::Gt(largest, hn::Set(d, static_cast<float>(DeltaMushStage::kStraight)));
+    const auto is_bent = hn::Gt(largest, hn::Set(d, static_cast<float>(DeltaMushDefinition::kStraight)));
     corner.weight = hn::IfThenElseZero(is_bent, angle);
     return corner;
 }
@@ -335,7 +359,7 @@ void take_details(const MushFrame& frame, std::size_t begin, std::size_t end) {
 /// sqrt(x) for x >= 0. For x below any relevant squared length, some similarly small number.
 template <class D>
 HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
     // As in inverse_root().
     x = hn::Max(x, hn::Set(d, 1e-37f));
     const auto inverse = hn::ApproximateReciprocalSqrt(x);
@@ -350,7 +374,7 @@ HWY_INLINE Vec<D> root([[maybe_unused]] D d, Vec<D> x) {
 /// 1 / x for positive x. A division takes as long as the root.
 template <class D>
 HWY_INLINE Vec<D> reciprocal(D d, Vec<D> x) {
-#if HWY_ARCH_X86 && HWY_TARGET != HWY_EMU128
+#if HWY_ARCH_X86 && HWY_TARGET != HWY_SCALAR && HWY_TARGET != HWY_EMU128
     const auto estimate = hn::ApproximateReciprocal(x);
     return hn::Mul(estimate, hn::NegMulAdd(x, estimate, hn::Set(d, 2.0f)));
 #else
@@ -368,7 +392,7 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
     if constexpr (kValence > 0) valence = kValence;
     const Full d;
     using D = Full;
-    const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
+    const auto least = hn::Set(d, static_cast<float>(DeltaMushDefinition::kLeastLength));
     // There is room beyond the last vertex.
     alignas(64) float factors[kLanes];
     for (std::size_t lane = 0; lane < kLanes && !frame.is_uniform; ++lane) {
