@@ -7,23 +7,37 @@ import tomllib
 from pathlib import Path
 from types import ModuleType
 
-# The parts of the library that the extension uses.
-NAMES = (
-    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Lock", "Method", "Normals", "Parameter"),
-    *(
-        "Precomputation",
-        "SkinnedNormals",
-        "Stage",
-        "TwistSpread",
-        "affine",
-        "centres_of_rotation",
-        "direct_delta_mush",
-        "dual_quat",
-        "interpolate",
-    ),
-    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages", "thread_id"),
-    *("crossing_triangles", "weights_in_memory"),
-)
+# What the library must have, all of which ./dev stub writes.
+NAMES = """
+    Binding
+    BulgeLimit
+    Deformer
+    DeltaMush
+    Lock
+    Method
+    Normals
+    Parameter
+    Precomputation
+    Skeleton
+    SkinnedNormals
+    Stage
+    TwistSpread
+    affine
+    centres_of_rotation
+    crossing_triangles
+    direct_delta_mush
+    dual
+    dual_quat
+    interpolate
+    keep_thread_state
+    methods
+    quat
+    quat_vec
+    spline
+    stages
+    thread_id
+    weights_in_memory
+""".split()
 
 
 def load_error() -> str | None:

@@ -28,22 +28,14 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 
 }  // namespace
 
-Owned<Deformer::State> Deformer::State::alone(const BindData& data, const MethodInfo& method,
-                                              const std::optional<MixData>& mix_data) {
-    const auto packed = std::make_shared<PackedBinding>(data);
-    std::vector<Lanes<float>> rest_points = std::move(packed->mesh.rest_points);
-    return make_owned<State>(packed, std::move(rest_points), method, mix_data);
-}
-
 BoneSets Deformer::State::wanted_sets() const {
     const auto wants = [](const Kernel* kernel) { return kernel->has_rows_of_sets; };
     return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
 }
 
-Deformer::State::State(std::shared_ptr<const PackedBinding> from, std::vector<Lanes<float>> rest_points,
-                       const MethodInfo& method, const std::optional<MixData>& mix_data)
+Deformer::State::State(std::shared_ptr<const PackedBinding> from, const MethodInfo& method,
+                       const std::optional<MixData>& mix_data)
     : packed(std::move(from)),
-      own_rest_points(std::move(rest_points)),
       methods{checked_method("method", method, *packed),
               mix_data ? checked_method("mix", mix_data->method, *packed) : 0},
       kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
@@ -53,10 +45,7 @@ Deformer::State::State(std::shared_ptr<const PackedBinding> from, std::vector<La
       palettes(kernels_in_use(), packed->mesh.used_bones.size(), sets.bones.size()) {}
 
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
-    : state_(make_owned<State>(binding.packed(), std::vector<Lanes<float>>{}, method, mix)) {}
-
-Deformer::Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix)
-    : state_(State::alone(data, method, mix)) {}
+    : state_(make_owned<State>(binding.packed(), method, mix)) {}
 
 const MethodInfo& Deformer::method() const noexcept { return kMethods[state_->methods[0]]; }
 const MethodInfo* Deformer::mixed_method() const noexcept {
@@ -89,7 +78,12 @@ PreparedPose Deformer::State::prepare(const Pose& pose, const DeformOptions& opt
     PreparedPose prepared{SpaceRows(pose.bones_from_model),
                           {valid_values(kMethods[methods[0]], options.parameters),
                            valid_values(kMethods[methods[1]], options.mix_parameters)}};
-    const Bones bones{.used = packed->mesh.used_bones,
+    const std::vector<std::int32_t>& used = packed->mesh.used_bones;
+    // Nearly always all of them.
+    std::size_t posed = used.size();
+    while (posed > 0 && static_cast<std::size_t>(used[posed - 1]) >= pose.posed_from_rest.size()) --posed;
+    const Bones bones{.used = used,
+                      .posed = posed,
                       .stretched = packed->stretched_bones,
                       .rest_bones = packed->rest_bones,
                       .pairs = &packed->mesh.pairs,

@@ -39,7 +39,8 @@ public:
     Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix = {});
 
     /// Constructs its own binding, which no other deformer shares.
-    Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {});
+    Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {})
+        : Deformer(Binding(data), method, mix) {}
 
     [[nodiscard]] const MethodInfo& method() const noexcept;
     /// The method that the stage `mix` adds, or null.

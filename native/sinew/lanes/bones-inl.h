@@ -200,7 +200,7 @@ void fill_rigid(const Bones& bones, bool keeps_signs, Palette& palette) {
     palette.keeps_signs = keeps_signs;
     std::size_t scaled = 0;
     for (const std::int32_t bone : bones.stretched) {
-        if (bones.is_posed(static_cast<std::size_t>(bone))) palette.scaled[scaled++] = bone;
+        if (static_cast<std::size_t>(bone) < bones.posed) palette.scaled[scaled++] = bone;
     }
     scaled = write_rigid_rows<Rows>(bones, scaled, palette);
     for (const std::int32_t bone : std::span(palette.scaled, scaled)) {

@@ -184,14 +184,6 @@ HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D
     return {hn::MulAdd(scale, b.x, a.x), hn::MulAdd(scale, b.y, a.y), hn::MulAdd(scale, b.z, a.z)};
 }
 
-/// Rotates `v` by the unit quaternion `q` (w, x, y, z).
-template <class D>
-HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
-    const Points<D> axis = in_all_lanes(d, q + 1);
-    const Points<D> inner = add_scaled<D>(cross<D>(axis, v), hn::Set(d, q[0]), v);
-    return add_scaled<D>(v, hn::Set(d, 2.0f), cross<D>(axis, inner));
-}
-
 /// The squared length of a quaternion [4].
 template <class D>
 HWY_INLINE Vec<D> squared_norm(const Vec<D>* q) {

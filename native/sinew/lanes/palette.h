@@ -63,7 +63,8 @@ inline const Affine<float> kIdentity{};
 
 /// The bones of a mesh in one pose.
 struct Bones {
-    std::span<const std::int32_t> used;  // their numbers in the pose
+    std::span<const std::int32_t> used;  // their numbers in the pose, ascending
+    std::size_t posed;                   // how many of `used` the pose has; the others stay at rest
     // indices into `used` of those whose rest axes do not have unit length
     std::span<const std::int32_t> stretched;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
@@ -71,12 +72,9 @@ struct Bones {
     const BoneSets* sets;  // empty unless a kernel has rows of sets
     Pose pose;
 
-    [[nodiscard]] bool is_posed(std::size_t bone) const noexcept {
-        return static_cast<std::size_t>(used[bone]) < pose.posed_from_rest.size();
-    }
-    /// Of an index into `used`; the identity if the pose lacks it.
+    /// Of an index into `used`.
     [[nodiscard]] const Affine<float>& motion(std::size_t bone) const noexcept {
-        return is_posed(bone) ? pose.posed_from_rest[static_cast<std::size_t>(used[bone])] : kIdentity;
+        return bone < posed ? pose.posed_from_rest[static_cast<std::size_t>(used[bone])] : kIdentity;
     }
 
     /// Orthonormal, for an index into `used`.

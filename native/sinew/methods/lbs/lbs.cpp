@@ -277,7 +277,7 @@ void rows_between_spaces(const Bones& bones, Palette& palette) {
     const Affine<double> model_from_bones = inverse(bones_from_model);
     for (std::size_t i = 0; i < bones.used.size(); ++i) {
         Affine<double> motion;
-        if (bones.is_posed(i)) motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
+        if (i < bones.posed) motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
         const Mat3<double> m = motion.linear - Mat3<double>(1.0);
         Float4* const columns = &palette.bones[kLbsColumns * i];
         for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
