@@ -20,7 +20,6 @@
 #include "sinew/methods/methods.h"
 #include "sinew/normals.h"
 #include "sinew/skeleton/continued_rotations.h"
-#include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skinned_normals.h"
 #include "sinew/stages/stages.h"
 #include "sinew/transform/make.h"

@@ -12,7 +12,7 @@
 #include "sinew/interpolate/methods.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
 #include "sinew/normals.h"
-#include "sinew/skeleton/forward_kinematics.h"
+#include "sinew/skeleton/skeleton.h"
 #include "sinew/skinned_normals.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
