@@ -13,7 +13,7 @@
 #include "sinew/deformer.h"
 #include "sinew/mesh/check_arrays.h"
 #include "sinew/methods/methods.h"
-#include "sinew/skeleton/continued_rotations.h"
+#include "sinew/pose/continued_rotations.h"
 #include "sinew/stages/mix/mix.h"
 
 namespace sinew::bindings {

@@ -29,7 +29,7 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 }  // namespace
 
 BoneSets Deformer::State::wanted_sets() const {
-    const auto wants = [](const Kernel* kernel) { return kernel->has_rows_of_sets; };
+    const auto wants = [](const Kernel* kernel) { return kernel->rows.are_of_sets; };
     return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
 }
 
@@ -42,7 +42,8 @@ Deformer::State::State(std::shared_ptr<const PackedBinding> from, const MethodIn
       mix(mix_data ? std::optional(checked_mix(packed->mesh, mix_data->weights, packed->vertex_count))
                    : std::nullopt),
       sets(wanted_sets()),
-      palettes(kernels_in_use(), packed->mesh.used_bones.size(), sets.bones.size()) {}
+      palettes({kernels[0]->rows, kernels[1]->rows}, mix ? 2 : 1, packed->mesh.used_bones.size(),
+               sets.bones.size()) {}
 
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
     : state_(make_owned<State>(binding.packed(), method, mix)) {}
@@ -106,7 +107,7 @@ void Deformer::State::deform(const PreparedPose& pose, std::span<const Lanes<flo
         frames[k] = {.mesh = &mesh,
                      .rest_points = rest_points.data(),
                      .vertex_data = packed->vertex_data[methods[k]].get(),
-                     .bones = kernels[k]->has_rows_of_sets ? sets.entries.data() : mesh.bones.data(),
+                     .bones = kernels[k]->rows.are_of_sets ? sets.entries.data() : mesh.bones.data(),
                      .palette = pose.palettes[k],
                      .spaces = pose.space_rows.spaces(),
                      .parameters = pose.parameters[k].data(),

@@ -9,7 +9,7 @@
 #include "sinew/base/owned.h"
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
-#include "sinew/skeleton/pose.h"
+#include "sinew/pose/pose.h"
 
 namespace sinew {
 

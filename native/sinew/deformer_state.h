@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sinew/deformer.h"
-#include "sinew/lanes/palette_store.h"
 #include "sinew/methods/packed_binding.h"
+#include "sinew/pose/palette_store.h"
 #include "sinew/stages/mix/mix_blocks.h"
 
 namespace sinew {

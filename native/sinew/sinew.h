@@ -19,7 +19,7 @@
 #include "sinew/methods/cor/centres_of_rotation.h"
 #include "sinew/methods/methods.h"
 #include "sinew/normals.h"
-#include "sinew/skeleton/continued_rotations.h"
+#include "sinew/pose/continued_rotations.h"
 #include "sinew/skinned_normals.h"
 #include "sinew/stages/stages.h"
 #include "sinew/transform/make.h"

@@ -21,10 +21,11 @@ MAY_INCLUDE = {
     "interpolate": {"transform", "interpolate"},
     "skeleton": {"base", *TRANSFORMS},
     "mesh": {"base", *TRANSFORMS, "mesh", ""},
-    "lanes": {"base", *TRANSFORMS, "mesh", "lanes"},
-    "methods": {"base", *TRANSFORMS, "mesh", "lanes", "methods", ""},
-    "stages": {"base", *TRANSFORMS, "mesh", "lanes", "methods", "stages", ""},
-    "normals": {"base", *TRANSFORMS, "mesh", "lanes", "normals", ""},
+    "pose": {"base", *TRANSFORMS, "mesh", "pose"},
+    "lanes": {"base", *TRANSFORMS, "mesh", "pose", "lanes"},
+    "methods": {"base", *TRANSFORMS, "mesh", "pose", "lanes", "methods", ""},
+    "stages": {"base", *TRANSFORMS, "mesh", "pose", "lanes", "methods", "stages", ""},
+    "normals": {"base", *TRANSFORMS, "mesh", "pose", "lanes", "normals", ""},
 }
 MAY_INCLUDE[""] = set(MAY_INCLUDE) | {""}
 

@@ -57,13 +57,17 @@ struct Motions {
     BonePoints translation;
 };
 
-/// The motions of the bones from `first` on, one in each lane. Further lanes repeat the last bone.
+/// The motions of the bones from `first` on, one in each lane. Other lanes, and those of bones that the pose lacks, have
+/// the identity.
 HWY_INLINE Motions load_motions(const Bones& bones, std::size_t first) {
     const BoneTag d;
+    const Affine<float> identity;
+    const bool are_posed = first + hn::Lanes(d) <= bones.posed;
     alignas(64) double numbers[12][hn::MaxLanes(BoneTag())];
     for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
         static_assert(sizeof(Affine<float>) == 12 * sizeof(float));
-        const float* const from = &bones.motion(std::min(first + lane, bones.used.size() - 1)).linear[0].x;
+        const bool is_posed = are_posed || first + lane < bones.posed;
+        const float* const from = &(is_posed ? bones.motion(first + lane) : identity).linear[0].x;
         for (std::size_t i = 0; i < 12; ++i) numbers[i][lane] = static_cast<double>(from[i]);
     }
     const auto column = [&](std::size_t i) HWY_ATTR {
@@ -214,6 +218,7 @@ void fill_rigid(const Bones& bones, bool keeps_signs, Palette& palette) {
 template <std::size_t kSize, std::size_t kFirst, std::size_t kStep>
 struct TranslatedRows {
     static constexpr std::size_t kNumbers = kSize;
+    static constexpr RowLayout kRows{kNumbers / 4};
 
     /// Adds what the bone's scale adds to the translation.
     template <class D>

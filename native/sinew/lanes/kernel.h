@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/pose/palette.h"
 
 namespace sinew {
 
@@ -70,9 +70,7 @@ struct Kernel {
     /// keeps_signs  give rows the signs of Pose::rotations, and keep them
     OfTargets<FillPalette> fill_palette;
 
-    std::size_t row_float4s;        // in the row of a bone
-    bool has_rows_of_sets = false;  // one for each bone of each set of bones, instead of one for each bone
-    bool keeps_scale = true;        // apart from the rows
+    RowLayout rows;
     PackVertexData* pack_vertex_data = nullptr;  // of checked vertex data; null if the method has none
 };
 

@@ -14,8 +14,8 @@
 #include "hwy/highway.h"
 #include "sinew/lanes/kernel.h"
 
-// Defines Method::kernel() from the static functions of a struct that is compiled for each instruction set. Further
-// arguments are other members of Kernel.
+// Defines Method::kernel() from the static functions of a struct that is compiled for each instruction set, and the
+// layout of its rows. Further arguments are other members of Kernel.
 #undef SINEW_KERNEL
 #if HWY_ONCE
 #define SINEW_KERNEL(Method, Struct, ...)                                                    \
@@ -23,7 +23,7 @@
     const Kernel& Method::kernel() noexcept {                                                \
         static constexpr Kernel kKernel{.deform = SINEW_TARGETS(Struct::deform),             \
                                         .fill_palette = SINEW_TARGETS(Struct::fill_palette), \
-                                        .row_float4s = HWY_NAMESPACE::Struct::kNumbers / 4,  \
+                                        .rows = HWY_NAMESPACE::Struct::kRows,                \
                                         __VA_ARGS__};                                        \
         return kKernel;                                                                      \
     }                                                                                        \

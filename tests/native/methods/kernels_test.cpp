@@ -12,7 +12,7 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 #include "sinew/base/x86_support.h"
-#include "sinew/skeleton/continued_rotations.h"
+#include "sinew/pose/continued_rotations.h"
 
 namespace sinew::test {
 namespace {

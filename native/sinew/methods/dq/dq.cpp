@@ -11,6 +11,7 @@ namespace sinew::HWY_NAMESPACE {
 
 struct DqKernel : RigidFunctions<Dq, DqKernel> {
     static constexpr std::size_t kNumbers = kRow;
+    static constexpr RowLayout kRows{kNumbers / 4};
     static constexpr std::size_t kSignedFloat4s = 2;
 
     /// Adds to the dual part + 1/2 added * real, for what the bone's scale adds.

@@ -275,9 +275,8 @@ void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
 void rows_between_spaces(const Bones& bones, Palette& palette) {
     const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
     const Affine<double> model_from_bones = inverse(bones_from_model);
-    for (std::size_t i = 0; i < bones.used.size(); ++i) {
-        Affine<double> motion;
-        if (i < bones.posed) motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
+    for (std::size_t i = 0; i < bones.posed; ++i) {
+        const Affine<double> motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
         const Mat3<double> m = motion.linear - Mat3<double>(1.0);
         Float4* const columns = &palette.bones[kLbsColumns * i];
         for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
@@ -296,7 +295,7 @@ void rows_in_model(const Bones& bones, Palette& palette) {
     const auto three = hn::FirstN(d, 3);
     // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-    for (std::size_t i = 0; i < bones.used.size(); ++i) {
+    for (std::size_t i = 0; i < bones.posed; ++i) {
         const float* const from = &bones.motion(i).linear[0].x;
         float* const to = palette.bones[kLbsColumns * i].value.data();
         auto squares = hn::Zero(d);
@@ -325,7 +324,7 @@ void rows_in_model(const Bones& bones, Palette& palette) { rows_between_spaces(b
 }  // namespace
 
 struct LbsKernel {
-    static constexpr std::size_t kNumbers = kColumns;
+    static constexpr RowLayout kRows{.float4s = kLbsColumns, .have_scales = false};
 
     static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
         for_each_set(
@@ -336,6 +335,9 @@ struct LbsKernel {
 
     static void fill_palette(const Bones& bones, bool, Palette& palette) {
         palette.any_scale = palette.keeps_signs = false;
+        const std::size_t at_rest = bones.used.size() - bones.posed;
+        std::fill_n(palette.bones + kLbsColumns * bones.posed, kLbsColumns * at_rest, Float4{});
+        std::fill_n(palette.sizes + bones.posed, at_rest, kMinSize * kMinSize);
         is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
                                                  : rows_between_spaces(bones, palette);
         find_absolute_sums(bones, palette);
@@ -345,4 +347,4 @@ struct LbsKernel {
 }  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-SINEW_KERNEL(Lbs, LbsKernel, .keeps_scale = false)
+SINEW_KERNEL(Lbs, LbsKernel)

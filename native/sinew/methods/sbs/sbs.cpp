@@ -20,6 +20,7 @@ namespace sinew::HWY_NAMESPACE {
 
 struct SbsKernel : TranslatedRows<12, 4, 1> {
     static constexpr std::size_t kSignedFloat4s = 1;
+    static constexpr RowLayout kRows{.float4s = kNumbers / 4, .are_of_sets = true};
 
     static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
         deform_rigid<SbsKernel>(frame, begin, end);
@@ -40,7 +41,7 @@ struct SbsKernel : TranslatedRows<12, 4, 1> {
 }  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-SINEW_KERNEL(Sbs, SbsKernel, .has_rows_of_sets = true)
+SINEW_KERNEL(Sbs, SbsKernel)
 
 #if HWY_ONCE
 namespace sinew {
@@ -60,7 +61,7 @@ static void write_set(const Bones& bones, std::size_t begin, std::size_t end, Pa
         const RigidBone& bone = palette.rigid_bones[bones.sets->bones[i]];
         const Vec3<double> moved =
             rotation_displacement(bone.rigid.rotation, centre) + bone.rigid.translation;
-        Float4* const row = palette.bones + HWY_NAMESPACE::SbsKernel::kNumbers / 4 * i;
+        Float4* const row = palette.bones + HWY_NAMESPACE::SbsKernel::kRows.float4s * i;
         row[0] = float4(bone.rigid.rotation);
         row[1] = float4(moved.x, moved.y, moved.z, 0.0);
         row[2] = float4(centre.x, centre.y, centre.z, 0.0);

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "sinew/mesh/packed_mesh.h"
-#include "sinew/skeleton/pose.h"
+#include "sinew/pose/pose.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
@@ -40,13 +40,20 @@ inline constexpr float kMaxStretchSquared = 64.0f;
 /// Sizes are written in groups of this many; there is room for one less after the last bone.
 inline constexpr std::size_t kSizesAtOnce = 8;
 
+/// What a kernel keeps in a palette.
+struct RowLayout {
+    std::size_t float4s;       // in a row
+    bool are_of_sets = false;  // one for each bone of each set of bones, instead of one for each bone
+    bool have_scales = true;   // apart from them
+};
+
 /// A bone's motion in double.
 using RigidBone = ScaledRigid<QuatVec<double>, double>;
 
 /// The bones of one frame in the form that a kernel reads, indexed as Frame::bones. A PaletteStore owns the
 /// memory.
 struct Palette {
-    Float4* bones = nullptr;  // Kernel::row_float4s for each row
+    Float4* bones = nullptr;  // RowLayout::float4s for each row
     // squared lengths of the translations, at least kMinSize squared; infinite beyond kMaxStretchSquared
     float* sizes = nullptr;
     // Whether a vertex whose first bone is this one may need an absolute sum.
@@ -59,8 +66,6 @@ struct Palette {
     bool keeps_signs = false;  // whether rows are added with the signs that they have
 };
 
-inline const Affine<float> kIdentity{};
-
 /// The bones of a mesh in one pose.
 struct Bones {
     std::span<const std::int32_t> used;  // their numbers in the pose, ascending
@@ -72,9 +77,9 @@ struct Bones {
     const BoneSets* sets;  // empty unless a kernel has rows of sets
     Pose pose;
 
-    /// Of an index into `used`.
+    /// Of an index into `used`, below `posed`.
     [[nodiscard]] const Affine<float>& motion(std::size_t bone) const noexcept {
-        return bone < posed ? pose.posed_from_rest[static_cast<std::size_t>(used[bone])] : kIdentity;
+        return pose.posed_from_rest[static_cast<std::size_t>(used[bone])];
     }
 
     /// Orthonormal, for an index into `used`.

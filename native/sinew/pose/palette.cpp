@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/lanes/palette.h"
+#include "sinew/pose/palette.h"
 
 #include <algorithm>
 #include <limits>
