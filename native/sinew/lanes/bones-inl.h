@@ -57,17 +57,15 @@ struct Motions {
     BonePoints translation;
 };
 
-/// The motions of the bones from `first` on, one in each lane. Other lanes, and those of bones that the pose lacks, have
-/// the identity.
+/// The motions of the posed bones from `first` on, one in each lane. Further lanes repeat the last bone.
 HWY_INLINE Motions load_motions(const Bones& bones, std::size_t first) {
     const BoneTag d;
-    const Affine<float> identity;
-    const bool are_posed = first + hn::Lanes(d) <= bones.posed;
+    const std::span used = bones.used.subspan(first, bones.posed - first);
+    const Affine<float>* const motions = bones.pose.posed_from_rest.data();
     alignas(64) double numbers[12][hn::MaxLanes(BoneTag())];
     for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
         static_assert(sizeof(Affine<float>) == 12 * sizeof(float));
-        const bool is_posed = are_posed || first + lane < bones.posed;
-        const float* const from = &(is_posed ? bones.motion(first + lane) : identity).linear[0].x;
+        const float* const from = &motions[used[std::min(lane, used.size() - 1)]].linear[0].x;
         for (std::size_t i = 0; i < 12; ++i) numbers[i][lane] = static_cast<double>(from[i]);
     }
     const auto column = [&](std::size_t i) HWY_ATTR {
@@ -146,14 +144,14 @@ inline void find_absolute_sums(const Bones& bones, Palette& palette) {
     }
 }
 
-/// Writes the rows and sizes of all bones as if they were rigid, and adds the indices of those that are not to
+/// Writes the rows and sizes of all posed bones as if they were rigid, and adds the indices of those that are not to
 /// palette.scaled, of which there are `scaled`. Returns how many there are then.
 template <class Rows>
 HWY_INLINE std::size_t write_rigid_rows(const Bones& bones, std::size_t scaled, Palette& palette) {
     const BoneTag d;
     constexpr std::size_t kMax = hn::MaxLanes(BoneTag());
     constexpr std::size_t kNumbers = Rows::kNumbers;
-    for (std::size_t i = 0; i < bones.used.size(); i += kMax) {
+    for (std::size_t i = 0; i < bones.posed; i += kMax) {
         const Motions motions = load_motions(bones, i);
         BoneVec row[kNumbers];
         Rows::write_row(rotations(motions), motions.translation, row);
@@ -165,7 +163,8 @@ HWY_INLINE std::size_t write_rigid_rows(const Bones& bones, std::size_t scaled, 
         const hn::Rebind<float, BoneTag> floats;
         hn::StoreU(hn::DemoteTo(floats, sizes), floats, palette.sizes + i);
         hn::Store(hn::IfThenElseZero(is_rotation(motions), hn::Set(d, 1.0)), d, rigid);
-        for (std::size_t lane = 0; lane < std::min(kMax, bones.used.size() - i); ++lane) {
+        const std::size_t count = std::min(kMax, bones.posed - i);
+        for (std::size_t lane = 0; lane < count; ++lane) {
             if (rigid[lane] == 0.0) palette.scaled[scaled++] = static_cast<std::int32_t>(i + lane);
             float* const to = palette.bones[kNumbers / 4 * (i + lane)].value.data();
             for (std::size_t k = 0; k < kNumbers; ++k) to[k] = static_cast<float>(numbers[k][lane]);
@@ -174,27 +173,34 @@ HWY_INLINE std::size_t write_rigid_rows(const Bones& bones, std::size_t scaled, 
     return scaled;
 }
 
+/// Writes the row and the size of one bone.
+template <class Rows>
+void write_row(std::size_t bone, QuatVec<double> motion, Palette& palette) {
+    Quat<double>& q = motion.rotation;
+    // Without a sign, as rotations() gives it.
+    if (Rows::kSignedFloat4s == 0 && q.w < 0.0) q = -q;
+    const BoneTag d;
+    const auto vector = [d](const auto& v) HWY_ATTR {
+        return BonePoints{hn::Set(d, v.x), hn::Set(d, v.y), hn::Set(d, v.z)};
+    };
+    BoneVec row[Rows::kNumbers];
+    Rows::write_row({hn::Set(d, q.w), vector(q)}, vector(motion.translation), row);
+    float* const to = palette.bones[Rows::kNumbers / 4 * bone].value.data();
+    for (std::size_t k = 0; k < Rows::kNumbers; ++k) to[k] = static_cast<float>(hn::GetLane(row[k]));
+    palette.sizes[bone] = size_of(motion.translation);
+}
+
 /// Writes the row and the scale of a bone by Method::prepare().
 template <class Method, class Rows>
 void write_scaled_row(const Bones& bones, std::size_t bone, Palette& palette) {
     const auto motion = Method::prepare(cast<double>(bones.motion(bone)), bones.rest_bone(bone));
-    auto [rotation, translation] = to_quat_vec(motion.rigid);
-    palette.sizes[bone] = size_of(translation);
-    if (motion.has_scale) {
-        if (!palette.any_scale) std::fill_n(palette.has_scale, bones.used.size(), std::uint8_t{0});
-        palette.any_scale = true;
-        palette.has_scale[bone] = 1;
-        Rows::write_scale(rotation, motion.scale, palette.scales + kDisplacementRows * bone);
-    }
-    // Without a sign, as rotations() gives it.
-    if (Rows::kSignedFloat4s == 0 && rotation.w < 0.0) rotation = -rotation;
-    const BoneTag d;
-    BoneVec row[Rows::kNumbers];
-    Rows::write_row(
-        {hn::Set(d, rotation.w), {hn::Set(d, rotation.x), hn::Set(d, rotation.y), hn::Set(d, rotation.z)}},
-        {hn::Set(d, translation.x), hn::Set(d, translation.y), hn::Set(d, translation.z)}, row);
-    float* const to = palette.bones[Rows::kNumbers / 4 * bone].value.data();
-    for (std::size_t k = 0; k < Rows::kNumbers; ++k) to[k] = static_cast<float>(hn::GetLane(row[k]));
+    const QuatVec<double> rigid = to_quat_vec(motion.rigid);
+    write_row<Rows>(bone, rigid, palette);
+    if (!motion.has_scale) return;
+    if (!palette.any_scale) std::fill_n(palette.has_scale, bones.used.size(), std::uint8_t{0});
+    palette.any_scale = true;
+    palette.has_scale[bone] = 1;
+    Rows::write_scale(rigid.rotation, motion.scale, palette.scales + kDisplacementRows * bone);
 }
 
 /// Kernel::fill_palette for a method that blends rotations.
@@ -207,6 +213,7 @@ void fill_rigid(const Bones& bones, bool keeps_signs, Palette& palette) {
         if (static_cast<std::size_t>(bone) < bones.posed) palette.scaled[scaled++] = bone;
     }
     scaled = write_rigid_rows<Rows>(bones, scaled, palette);
+    for (std::size_t bone = bones.posed; bone < bones.used.size(); ++bone) write_row<Rows>(bone, {}, palette);
     for (const std::int32_t bone : std::span(palette.scaled, scaled)) {
         write_scaled_row<Method, Rows>(bones, static_cast<std::size_t>(bone), palette);
     }
