@@ -7,7 +7,7 @@ import tomllib
 from pathlib import Path
 from types import ModuleType
 
-# What the library must have, all of which ./dev stub writes.
+# The parts of the library that the extension uses; ./dev stub writes them.
 NAMES = """
     Binding
     BulgeLimit
@@ -18,7 +18,6 @@ NAMES = """
     Normals
     Parameter
     Precomputation
-    Skeleton
     SkinnedNormals
     Stage
     TwistSpread
@@ -26,7 +25,6 @@ NAMES = """
     centres_of_rotation
     crossing_triangles
     direct_delta_mush
-    dual
     dual_quat
     interpolate
     keep_thread_state

@@ -8,6 +8,7 @@ python tools/make_stub.py [--out FOLDER]    FOLDER: the stub alone, into it
 from __future__ import annotations
 
 import argparse
+import ast
 import json
 import re
 import shutil
@@ -45,6 +46,18 @@ def write_stub(folder: Path) -> None:
         shutil.copytree(Path(made, "sinew", "_native"), folder)
 
 
+def used_names() -> set[str]:
+    """What the extension uses of the library."""
+    used = set()
+    for path in (ROOT / "addon").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module == "sinew" and not node.level:
+                used |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "sinew":
+                used.add(node.attr)
+    return {name for name in used if not name.startswith("_")}
+
+
 def lists() -> dict[Path, str]:
     """Each file with a list that is made from the library's, as it should be."""
     methods = json.dumps([method.name for method in sinew.methods()])
@@ -53,7 +66,7 @@ def lists() -> dict[Path, str]:
         f"| `{each.name}` | {each.group} | {each.label}: {each.description[0].lower()}{each.description[1:]} |\n"
         for each in sinew.methods()
     ]
-    names = "".join(f"    {name}\n" for name in sinew.__all__)
+    names = "".join(f"    {name}\n" for name in sorted(used_names()))
     made = [
         ("docs/SINEW_skinning.schema.json", r'("enum": )\[.*?\](\n        },\n        "mix")', methods),
         ("docs/SINEW_skinning.schema.json", r'("items": \{"enum": )\[.*?\]()', stages),
