@@ -309,8 +309,7 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
     options.mix_parameters = arguments.values.of_mix;
     if (!parents.is_none()) {
         const auto of_bones = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
-        arguments.rotations =
-            continued_rotations(Skeleton(as_span(of_bones)), arguments.bones, checked_turns(turns));
+        arguments.rotations = continued_rotations(as_span(of_bones), arguments.bones, checked_turns(turns));
         arguments.pose.rotations = arguments.rotations;
     }
     arguments.pose.posed_from_rest = arguments.bones;
