@@ -48,6 +48,11 @@ Deformer::State::State(std::shared_ptr<const PackedBinding> from, const MethodIn
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
     : state_(make_owned<State>(binding.packed(), method, mix)) {}
 
+Deformer::Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix)
+    : Deformer(Binding(data), method, mix) {
+    state_->own_rest_points = state_->packed->mesh.rest_points;
+}
+
 const MethodInfo& Deformer::method() const noexcept { return kMethods[state_->methods[0]]; }
 const MethodInfo* Deformer::mixed_method() const noexcept {
     return state_->mix ? &kMethods[state_->methods[1]] : nullptr;

@@ -38,9 +38,8 @@ public:
     /// Throws also for a method that is not in the list of methods, and one whose vertex data the binding lacks.
     Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix = {});
 
-    /// Constructs its own binding, which no other deformer shares.
-    Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {})
-        : Deformer(Binding(data), method, mix) {}
+    /// Constructs its own binding, which no other deformer shares, with memory for other rest points.
+    Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {});
 
     [[nodiscard]] const MethodInfo& method() const noexcept;
     /// The method that the stage `mix` adds, or null.
