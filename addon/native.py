@@ -8,34 +8,34 @@ from pathlib import Path
 from types import ModuleType
 
 # The parts of the library that the extension uses; ./dev stub writes them.
-NAMES = """
-    Binding
-    BulgeLimit
-    Deformer
-    DeltaMush
-    Lock
-    Method
-    Normals
-    Parameter
-    Precomputation
-    SkinnedNormals
-    Stage
-    TwistSpread
-    affine
-    centres_of_rotation
-    crossing_triangles
-    direct_delta_mush
-    dual_quat
-    interpolate
-    keep_thread_state
-    methods
-    quat
-    quat_vec
-    spline
-    stages
-    thread_id
-    weights_in_memory
-""".split()
+NAMES = [
+    "Binding",
+    "BulgeLimit",
+    "Deformer",
+    "DeltaMush",
+    "Lock",
+    "Method",
+    "Normals",
+    "Parameter",
+    "Precomputation",
+    "SkinnedNormals",
+    "Stage",
+    "TwistSpread",
+    "affine",
+    "centres_of_rotation",
+    "crossing_triangles",
+    "direct_delta_mush",
+    "dual_quat",
+    "interpolate",
+    "keep_thread_state",
+    "methods",
+    "quat",
+    "quat_vec",
+    "spline",
+    "stages",
+    "thread_id",
+    "weights_in_memory",
+]
 
 
 def load_error() -> str | None:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes what is made from the library that is installed: the stub of sinew._native, which editors and type checkers
-read, and the lists of methods and stages in files that can not read them.
+"""Writes what is made from the library that is installed: the stub of sinew._native, which editors and type
+checkers read, and the lists of methods and stages in files that can not read them.
 
 python tools/make_stub.py [--out FOLDER]    FOLDER: the stub alone, into it
 """
@@ -63,8 +63,8 @@ def lists() -> dict[Path, str]:
     methods = json.dumps([method.name for method in sinew.methods()])
     stages = json.dumps([stage.name for stage in sinew.stages() if stage.name != "mix"])
     rows = [
-        f"| `{each.name}` | {each.group} | {each.label}: {each.description[0].lower()}{each.description[1:]} |\n"
-        for each in sinew.methods()
+        f"| `{m.name}` | {m.group} | {m.label}: {m.description[0].lower()}{m.description[1:]} |\n"
+        for m in sinew.methods()
     ]
     names = "".join(f"    {name}\n" for name in sorted(used_names()))
     made = [

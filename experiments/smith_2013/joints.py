@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from types import ModuleType
 
 import numpy as np
@@ -28,7 +28,7 @@ def keys(degrees: float) -> np.ndarray:
     return np.array([[*rotation, 0, 0, 0], [*rotation, 1, 0, 0]])
 
 
-def root_relative(module: ModuleType, parents: Sequence[int], relative: np.ndarray) -> np.ndarray:
+def root_relative(module: ModuleType, parents: Iterable[int], relative: np.ndarray) -> np.ndarray:
     """[bones, ..]: each bone relative to the root, by algorithm 1.
 
     module    the transforms' layout

@@ -10,7 +10,6 @@ from pathlib import Path
 
 import bpy
 import pytest
-import sinew
 from program import COMMAND, ENVIRONMENT, ran
 from sinew_addon.attach import properties
 from sinew_addon.io import files

@@ -4,7 +4,6 @@ exact_interpolation.py has the oracles."""
 
 import numpy as np
 import pytest
-import sinew
 from motions import LAYOUT_OF, close, layout, matrix, rigid
 from scipy.spatial.transform import RigidTransform, Rotation
 from sinew.interpolate import METHODS, between
