@@ -66,13 +66,13 @@ def lists() -> dict[Path, str]:
         f"| `{m.name}` | {m.group} | {m.label}: {m.description[0].lower()}{m.description[1:]} |\n"
         for m in sinew.methods()
     ]
-    names = "".join(f"    {name}\n" for name in sorted(used_names()))
+    names = "".join(f'    "{name}",\n' for name in sorted(used_names()))
     made = [
         ("docs/SINEW_skinning.schema.json", r'("enum": )\[.*?\](\n        },\n        "mix")', methods),
         ("docs/SINEW_skinning.schema.json", r'("items": \{"enum": )\[.*?\]()', stages),
         ("addon/jobs/sinew_reskin.js", r"(const METHODS = )\[.*?\](;)", methods),
         ("README.md", r"(when to use it \|\n\|---\|---\|---\|\n)(?:\|.*\n)*()", "".join(rows)),
-        ("addon/native.py", r'(NAMES = """\n)(?:    \w+\n)*()', names),
+        ("addon/native.py", r'(NAMES = \[\n)(?:    "\w+",\n)*()', names),
     ]
     texts: dict[Path, str] = {}
     for name, pattern, value in made:

@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects what ./dev stub makes of the library: the stub, which editors and type checkers read and which describes
-everything, and lists in files that can not read the library's."""
+"""Protects what ./dev stub makes of the library: the stub, which editors and type checkers read and which
+describes everything, and lists in files that can not read the library's."""
 
 import ast
 import subprocess
