@@ -9,7 +9,7 @@
 #include "sinew/normals/normal_mesh.h"
 
 #define SINEW_THIS_FILE "sinew/normals/normal_kernel.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/gather-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -7,7 +7,7 @@
 #include "sinew/lanes/kernel.h"
 
 #define SINEW_THIS_FILE "sinew/normals/skinned_normal_kernel.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/gather-inl.h"
 
 HWY_BEFORE_NAMESPACE();

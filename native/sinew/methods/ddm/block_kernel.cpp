@@ -6,7 +6,7 @@
 #include "sinew/methods/ddm/block_factor.h"
 
 #define SINEW_THIS_FILE "sinew/methods/ddm/block_kernel.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace sinew::HWY_NAMESPACE {

@@ -9,7 +9,7 @@
 
 #define SINEW_THIS_FILE "sinew/methods/ddm/ddm.cpp"
 #include "hwy/cache_control.h"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -10,7 +10,7 @@
 #include <numbers>
 
 #define SINEW_THIS_FILE "sinew/methods/dib/dib.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 

@@ -3,7 +3,7 @@
 #include "sinew/methods/dq/dq.h"
 
 #define SINEW_THIS_FILE "sinew/methods/dq/dq.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();

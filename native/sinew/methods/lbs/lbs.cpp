@@ -9,7 +9,7 @@
 #include "sinew/transform/convert.h"
 
 #define SINEW_THIS_FILE "sinew/methods/lbs/lbs.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/bones-inl.h"
 

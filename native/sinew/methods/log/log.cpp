@@ -3,7 +3,7 @@
 #include "sinew/methods/log/log.h"
 
 #define SINEW_THIS_FILE "sinew/methods/log/log.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 

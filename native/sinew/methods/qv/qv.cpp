@@ -3,7 +3,7 @@
 #include "sinew/methods/qv/qv.h"
 
 #define SINEW_THIS_FILE "sinew/methods/qv/qv.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -5,7 +5,7 @@
 #include "sinew/methods/sbs/sbs.h"
 
 #define SINEW_THIS_FILE "sinew/methods/sbs/sbs.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/rigid-inl.h"
 
 namespace sinew {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #define SINEW_THIS_FILE "sinew/methods/sdef/sdef.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 

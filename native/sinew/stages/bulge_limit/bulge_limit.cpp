@@ -9,7 +9,7 @@
 #include "sinew/transform/split_scale.h"
 
 #define SINEW_THIS_FILE "sinew/stages/bulge_limit/bulge_limit.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/gather-inl.h"
 

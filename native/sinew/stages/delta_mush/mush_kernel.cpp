@@ -10,7 +10,7 @@
 #include "sinew/stages/delta_mush/mush_mesh.h"
 
 #define SINEW_THIS_FILE "sinew/stages/delta_mush/mush_kernel.cpp"
-#include "sinew/base/each_target.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
