@@ -571,6 +571,8 @@ void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
 /// The functions of a kernel for a method that blends rotations.
 template <class Method, class Rows>
 struct RigidFunctions {
+    RigidFunctions() = delete;  // its functions need no object
+
     static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
         deform_rigid<Rows>(frame, begin, end);
     }
