@@ -7,23 +7,35 @@ import tomllib
 from pathlib import Path
 from types import ModuleType
 
-# The parts of the library that the extension uses.
-NAMES = (
-    *("Binding", "BulgeLimit", "Deformer", "DeltaMush", "Lock", "Method", "Normals", "Parameter"),
-    *(
-        "Precomputation",
-        "SkinnedNormals",
-        "Stage",
-        "TwistSpread",
-        "affine",
-        "centres_of_rotation",
-        "direct_delta_mush",
-        "dual_quat",
-        "interpolate",
-    ),
-    *("keep_thread_state", "methods", "quat", "quat_vec", "spline", "stages", "thread_id"),
-    *("crossing_triangles", "weights_in_memory"),
-)
+# The parts of the library that the extension uses; ./dev stub writes them.
+NAMES = [
+    "Binding",
+    "BulgeLimit",
+    "Deformer",
+    "DeltaMush",
+    "Lock",
+    "Method",
+    "Normals",
+    "Parameter",
+    "Precomputation",
+    "SkinnedNormals",
+    "Stage",
+    "TwistSpread",
+    "affine",
+    "centres_of_rotation",
+    "crossing_triangles",
+    "direct_delta_mush",
+    "dual_quat",
+    "interpolate",
+    "keep_thread_state",
+    "methods",
+    "quat",
+    "quat_vec",
+    "spline",
+    "stages",
+    "thread_id",
+    "weights_in_memory",
+]
 
 
 def load_error() -> str | None:

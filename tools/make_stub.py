@@ -1,12 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Writes the stub of sinew._native, which editors and type checkers read, from the module that is installed.
+"""Writes what is made from the library that is installed: the stub of sinew._native, which editors and type
+checkers read, and the lists of methods and stages in files that can not read them.
 
-python tools/make_stub.py [--out FOLDER]    into native/python/sinew/_native, or FOLDER
+python tools/make_stub.py [--out FOLDER]    FOLDER: the stub alone, into it
 """
 
 from __future__ import annotations
 
 import argparse
+import ast
+import json
 import re
 import shutil
 import subprocess
@@ -14,7 +17,10 @@ import sys
 import tempfile
 from pathlib import Path
 
-STUB = Path(__file__).resolve().parents[1] / "native" / "python" / "sinew" / "_native"
+import sinew
+
+ROOT = Path(__file__).resolve().parents[1]
+STUB = ROOT / "native" / "python" / "sinew" / "_native"
 
 
 def docstring(found: re.Match[str]) -> str:
@@ -40,7 +46,47 @@ def write_stub(folder: Path) -> None:
         shutil.copytree(Path(made, "sinew", "_native"), folder)
 
 
+def used_names() -> set[str]:
+    """What the extension uses of the library."""
+    used = set()
+    for path in (ROOT / "addon").rglob("*.py"):
+        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.ImportFrom) and node.module == "sinew" and not node.level:
+                used |= {alias.name for alias in node.names}
+            elif isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "sinew":
+                used.add(node.attr)
+    return {name for name in used if not name.startswith("_")}
+
+
+def lists() -> dict[Path, str]:
+    """Each file with a list that is made from the library's, as it should be."""
+    methods = json.dumps([method.name for method in sinew.methods()])
+    stages = json.dumps([stage.name for stage in sinew.stages() if stage.name != "mix"])
+    rows = [
+        f"| `{m.name}` | {m.group} | {m.label}: {m.description[0].lower()}{m.description[1:]} |\n"
+        for m in sinew.methods()
+    ]
+    names = "".join(f'    "{name}",\n' for name in sorted(used_names()))
+    made = [
+        ("docs/SINEW_skinning.schema.json", r'("enum": )\[.*?\](\n        },\n        "mix")', methods),
+        ("docs/SINEW_skinning.schema.json", r'("items": \{"enum": )\[.*?\]()', stages),
+        ("addon/jobs/sinew_reskin.js", r"(const METHODS = )\[.*?\](;)", methods),
+        ("README.md", r"(when to use it \|\n\|---\|---\|---\|\n)(?:\|.*\n)*()", "".join(rows)),
+        ("addon/native.py", r'(NAMES = \[\n)(?:    "\w+",\n)*()', names),
+    ]
+    texts: dict[Path, str] = {}
+    for name, pattern, value in made:
+        path = ROOT / name
+        text = texts.get(path) or path.read_text(encoding="utf-8")
+        texts[path], found = re.subn(pattern, lambda its, new=value: its[1] + new + its[2], text)
+        assert found == 1, f"{name}: its list is not found"
+    return texts
+
+
 if __name__ == "__main__":
     parser = argparse.ArgumentParser(prog="./dev stub")
-    parser.add_argument("--out", type=Path, default=STUB)
-    write_stub(parser.parse_args().out)
+    parser.add_argument("--out", type=Path)
+    folder = parser.parse_args().out
+    write_stub(folder or STUB)
+    for path, text in {} if folder else lists().items():
+        path.write_text(text, encoding="utf-8")

@@ -9,7 +9,7 @@ const PROGRAMS = {
     "extension": { exe: "{blender}", args: ["--command", "sinew"] },
     "package": { exe: "{sinew}", args: [] },
 };
-// As `sinew methods` lists them; tests/blender/jobs/test_flamenco.py compares.
+// As `sinew methods` lists them; ./dev stub writes them.
 const METHODS = ["lbs", "dq", "cor", "ddm", "sdef", "qv", "sbs", "log", "dib"];
 
 // Runs where the job is submitted. Names have `/` between folders on every system, and end at the line: the Manager

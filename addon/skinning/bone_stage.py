@@ -3,7 +3,7 @@
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import Any, Generic, TypeVar
+from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
 import sinew
@@ -12,7 +12,12 @@ from .rig import Weighting
 from .scale_rule import IGNORED
 from .stage_mesh import StageMesh
 
-Native = TypeVar("Native", sinew.BulgeLimit, sinew.TwistSpread)
+
+class HasRestPoints(Protocol):
+    def set_rest_points(self, rest_points: np.ndarray, bones_from_model: np.ndarray) -> None: ...
+
+
+Native = TypeVar("Native", bound=HasRestPoints)
 
 
 class BoneStage(ABC, Generic[Native]):

@@ -3,6 +3,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from types import ModuleType
+
 import numpy as np
 import sinew
 from sinew_addon.base.errors import SinewError
@@ -25,17 +28,31 @@ def keys(degrees: float) -> np.ndarray:
     return np.array([[*rotation, 0, 0, 0], [*rotation, 1, 0, 0]])
 
 
+def root_relative(module: ModuleType, parents: Iterable[int], relative: np.ndarray) -> np.ndarray:
+    """[bones, ..]: each bone relative to the root, by algorithm 1.
+
+    module    the transforms' layout
+    parents   of each bone, which precedes it; -1 for none
+    relative  [bones, ..] to its parent
+    """
+    result = relative.copy()
+    for bone, parent in enumerate(parents):
+        if parent >= 0:
+            result[bone] = module.compose(result[parent], result[bone])
+    return result
+
+
 def arms(method: sinew.interpolate.Method, t: np.ndarray, from_root: bool) -> np.ndarray:
     """[t, 4, 3]: head and end of the first bone, then of the second."""
     module = layout(method)
-    skeleton = sinew.Skeleton([-1, 0])
+    parents = [-1, 0]
     ends = [in_layout(module, keys(degrees)) for degrees in (0.0, DEGREES)]
     if from_root:
         # The result of algorithm 1, interpolated by algorithm 2: the wrong order.
-        ends = [skeleton.root_relative(end) for end in ends]
+        ends = [root_relative(module, parents, end) for end in ends]
     bones = sinew.interpolate.between(ends[0], ends[1], t[:, None], method).transforms
     if not from_root:
-        bones = np.array([skeleton.root_relative(each) for each in bones])
+        bones = np.array([root_relative(module, parents, each) for each in bones])
     points = np.array([[0.0, 0, 0], [1.0, 0, 0]])
     return module.transform_point(bones[:, :, None], points).reshape(-1, 4, 3)
 

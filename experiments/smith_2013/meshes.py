@@ -11,6 +11,7 @@ import sinew
 from sinew_addon.features.measure.metrics import Shape
 from sinew_addon.skinning.surface import Surface
 
+from .joints import root_relative
 from .model import Fact, Figure, Picture
 
 TIMES = (0.0, 0.25, 0.5, 0.75, 1.0)
@@ -81,7 +82,6 @@ class Chain:
         """[vertices, 3]: each bone interpolated relative to its parent, then chained (Smith 2013, algorithms
         2 and 1)."""
         module = {"matrix": sinew.affine, "qv": sinew.quat_vec}.get(method.split("_")[0], sinew.dual_quat)
-        skeleton = sinew.Skeleton(self.parents)
         keys = []
         for pose in (self.first, self.second):
             relative = pose.copy()
@@ -96,7 +96,7 @@ class Chain:
             keys.append(relative)
         first, second = keys
         relative = sinew.interpolate.between(first, second, t, method).transforms
-        pose = skeleton.root_relative(relative)
+        pose = root_relative(module, self.parents, relative)
         if module is not sinew.affine:
             pose = module.to_affine(pose)
         moved = sinew.affine.compose(pose, sinew.affine.inverse(self.rest))

@@ -35,15 +35,16 @@ py::array_t<float> apply(const Timed<BulgeLimit>& limit, const ArrayLike& points
     const auto given = checked_points(points, "points", limit.vertex_count());
     const std::vector<Affine<float>> bones = checked_bones(bone_transforms, limit.bone_count());
     BulgeLimitOptions options;
-    options.strength = static_cast<float>(checked_option<BulgeLimitStage>(strength, "strength"));
-    options.form = static_cast<BulgeForm>(static_cast<int>(checked_option<BulgeLimitStage>(form, "form")));
+    options.strength = static_cast<float>(checked_option<BulgeLimitDefinition>(strength, "strength"));
+    options.form =
+        static_cast<BulgeForm>(static_cast<int>(checked_option<BulgeLimitDefinition>(form, "form")));
     options.threads = checked_threads(threads);
-    return applied(limit, given, out, [&](auto to) { return limit.apply(to, {bones}, options); });
+    return applied(limit, given, out, [&](auto to) { return limit.apply(to, bones, options); });
 }
 
 }  // namespace
 
-void bind_stage(py::module_& m, BulgeLimitStage) {
+void bind_stage(py::module_& m, BulgeLimitDefinition) {
     auto type = stage_class<BulgeLimit>(
         m, "BulgeLimit",
         R"(The stage `bulge_limit` for one mesh: moves deformed points back towards their bones where blending took

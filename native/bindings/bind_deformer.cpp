@@ -13,7 +13,7 @@
 #include "sinew/deformer.h"
 #include "sinew/mesh/check_arrays.h"
 #include "sinew/methods/methods.h"
-#include "sinew/skeleton/continued_rotations.h"
+#include "sinew/pose/continued_rotations.h"
 #include "sinew/stages/mix/mix.h"
 
 namespace sinew::bindings {
@@ -309,8 +309,7 @@ DeformArguments checked_deform(const Deformer& deformer, const py::object& bone_
     options.mix_parameters = arguments.values.of_mix;
     if (!parents.is_none()) {
         const auto of_bones = checked<std::int32_t>(parents, "parents", 1, "int32 [bones]");
-        arguments.rotations =
-            continued_rotations(Skeleton(as_span(of_bones)), arguments.bones, checked_turns(turns));
+        arguments.rotations = continued_rotations(as_span(of_bones), arguments.bones, checked_turns(turns));
         arguments.pose.rotations = arguments.rotations;
     }
     arguments.pose.posed_from_rest = arguments.bones;

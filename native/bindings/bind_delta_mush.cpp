@@ -11,7 +11,7 @@
 namespace sinew::bindings {
 namespace {
 
-constexpr auto kMaxIterations = static_cast<std::size_t>(DeltaMushStage::kMaxIterations);
+constexpr auto kMaxIterations = static_cast<std::size_t>(DeltaMushDefinition::kMaxIterations);
 
 /// Settings, and the array that their weights refer to.
 struct SettingArguments {
@@ -38,8 +38,8 @@ SettingArguments checked_settings(const py::object& iterations, const py::object
         iterations, "iterations", "an integer from 0 to " + std::to_string(kMaxIterations), kMaxIterations);
     arguments.settings.radius = checked_float(radius, "radius");
     arguments.settings.factor = checked_float(factor, "factor");
-    arguments.settings.type =
-        static_cast<SmoothType>(checked_choice(smooth_type, "smooth_type", DeltaMushStage::kSmoothTypes));
+    arguments.settings.type = static_cast<SmoothType>(
+        checked_choice(smooth_type, "smooth_type", DeltaMushDefinition::kSmoothTypes));
     arguments.settings.pin_boundary = checked_bool(pin_boundary, "pin_boundary");
     if (!weights.is_none()) {
         arguments.weights =
@@ -84,9 +84,9 @@ py::array_t<float> apply(const Timed<DeltaMush>& mush, const ArrayLike& points, 
 
 }  // namespace
 
-void bind_stage(py::module_& m, DeltaMushStage) {
+void bind_stage(py::module_& m, DeltaMushDefinition) {
     const DeltaMushSettings initial;
-    const char* const type = DeltaMushStage::kSmoothTypes[0].data();
+    const char* const type = DeltaMushDefinition::kSmoothTypes[0].data();
     stage_class<DeltaMush>(
         m, "DeltaMush",
         R"(The stage `delta_mush` for one mesh: smooths deformed points and adds the details of the rest points back

@@ -8,8 +8,6 @@
 namespace sinew::bindings {
 namespace {
 
-std::string text(std::string_view view) { return std::string(view); }
-
 using Kind = Typed<"typing.Literal['float', 'int', 'bool', 'enum', 'vertex_group', 'method']">;
 
 /// The default value; None for kinds that have none.
@@ -19,7 +17,7 @@ Typed<"float | int | bool | str | None"> initial_value(const Parameter& paramete
         case ParameterKind::integer: return py::int_(static_cast<long long>(parameter.initial));
         case ParameterKind::boolean: return py::bool_(parameter.initial != 0.0);
         case ParameterKind::choice:
-            return py::str(text(parameter.choices[static_cast<std::size_t>(parameter.initial)]));
+            return py::cast(parameter.choices[static_cast<std::size_t>(parameter.initial)]);
         case ParameterKind::vertex_group:
         case ParameterKind::method: break;
     }
@@ -52,41 +50,34 @@ Texts names_of(Needs needs) {
     return py::tuple(names);
 }
 
-/// A property with the text of this field.
-template <auto field, class Class>
-void def_text(Class& type, const char* name, const char* doc) {
-    type.def_property_readonly(
-        name, [](const typename Class::type& row) { return text(row.*field); }, doc);
-}
-
 /// The properties that methods and stages have in common.
 template <class Row>
 void def_facts(py::class_<Row>& type, const char* name) {
-    def_text<&Row::name>(type, "name", "The name in programs.");
-    def_text<&Row::label>(type, "label", "The name in the interface.");
-    def_text<&Row::description>(type, "description", "One sentence: when to use it.");
-    def_text<&Row::source>(type, "source", "The papers.");
+    type.def_readonly("name", &Row::name, "The name in programs.");
+    type.def_readonly("label", &Row::label, "The name in the interface.");
+    type.def_readonly("description", &Row::description, "One sentence: when to use it.");
+    type.def_readonly("source", &Row::source, "The papers.");
     type.def_property_readonly(
         "parameters", [](const Row& row) -> Typed<"tuple[sinew._native.Parameter, ...]"> {
             return tuple_of<Parameter>(row.parameters);
         },
         "Its settings.");
-    type.def("__repr__",
-             [name](const Row& row) { return "<sinew." + std::string(name) + " " + text(row.name) + ">"; });
+    type.def("__repr__", [name](const Row& row) {
+        return "<sinew." + std::string(name) + " " + std::string(row.name) + ">";
+    });
 }
 
 }  // namespace
 
 void bind_methods(py::module_& m) {
     py::class_<Parameter> parameter(m, "Parameter", "A setting of a method or of a stage.");
-    def_text<&Parameter::id>(parameter, "id", "The name in programs.");
-    def_text<&Parameter::label>(parameter, "label", "The name in the interface.");
-    def_text<&Parameter::description>(parameter, "description", "One sentence.");
-    def_text<&Parameter::unit>(parameter, "unit",
-                               "One of \"length\", \"angle\" (radians) and \"factor\", or empty.");
-    parameter
+    parameter.def_readonly("id", &Parameter::id, "The name in programs.")
+        .def_readonly("label", &Parameter::label, "The name in the interface.")
+        .def_readonly("description", &Parameter::description, "One sentence.")
+        .def_readonly("unit", &Parameter::unit,
+                      "One of \"length\", \"angle\" (radians) and \"factor\", or empty.")
         .def_property_readonly(
-            "kind", [](const Parameter& row) -> Kind { return py::str(text(name_of(row.kind))); },
+            "kind", [](const Parameter& row) -> Kind { return py::cast(name_of(row.kind)); },
             R"(A value of "enum" is one of `choices`, of "vertex_group" a weight for each vertex, of "method" a name.)")
         .def_property_readonly("default", &initial_value,
                                "The default; None for a vertex group and a method.")
@@ -99,28 +90,26 @@ void bind_methods(py::module_& m) {
         .def_property_readonly(
             "choices", [](const Parameter& row) -> Texts { return tuple_of<std::string>(row.choices); },
             "The values of an enum.")
-        .def("__repr__", [](const Parameter& row) { return "<sinew.Parameter " + text(row.id) + ">"; });
+        .def("__repr__",
+             [](const Parameter& row) { return "<sinew.Parameter " + std::string(row.id) + ">"; });
 
     py::class_<MethodInfo> method(m, "Method", "The facts about a skinning method.");
     def_facts(method, "Method");
     method
+        .def_readonly("number", &MethodInfo::number, "The number that .blend files store. It never changes.")
         .def_property_readonly(
-            "number", [](const MethodInfo& row) { return row.number; },
-            "The number that .blend files store. It never changes.")
-        .def_property_readonly(
-            "group", [](const MethodInfo& row) { return text(label_of(row.group)); },
+            "group", [](const MethodInfo& row) { return label_of(row.group); },
             "The heading of its group in menus.")
         .def_property_readonly(
             "needs", [](const MethodInfo& row) { return names_of(row.needs); },
             R"(What it needs besides points, influences and bone transforms: "rest_bones", the bones' axes, where bones are
 scaled; "vertex_data", numbers for each vertex, an argument of Binding; "topology", triangles from which these
 are computed; "precomputation", a function that computes them.)")
-        .def_property_readonly(
-            "vertex_floats", [](const MethodInfo& row) { return row.vertex_floats; },
+        .def_readonly(
+            "vertex_floats", &MethodInfo::vertex_floats,
             "How many numbers its vertex data has for each vertex, or in each row; 0 if it has none.")
-        .def_property_readonly(
-            "rows_by_bone", [](const MethodInfo& row) { return row.rows_by_bone; },
-            "Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.");
+        .def_readonly("rows_by_bone", &MethodInfo::rows_by_bone,
+                      "Whether its vertex data is rows, any number for each vertex: see direct_delta_mush.");
 
     py::class_<StageInfo> stage(m, "Stage", "The facts about a stage. Stages run after a method.");
     def_facts(stage, "Stage");

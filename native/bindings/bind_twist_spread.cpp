@@ -54,13 +54,13 @@ std::vector<TwistChannels<float>> checked_channels(const OptionalArrayLike& chan
 }
 
 TwistBlend checked_blend(const py::object& blend, const char* argument) {
-    return static_cast<TwistBlend>(checked_choice(blend, argument, TwistSpreadStage::kBlends));
+    return static_cast<TwistBlend>(checked_choice(blend, argument, TwistSpreadDefinition::kBlends));
 }
 
 py::array_t<float> angles(const Timed<TwistSpread>& spread, const ArrayLike& bone_transforms,
                           const OptionalArrayLike& channels) {
     const std::vector<Affine<float>> bones = checked_affines(bone_transforms, "bone_transforms");
-    const std::vector<float> found = spread.angles({bones}, checked_channels(channels, spread.twist_count()));
+    const std::vector<float> found = spread.angles(bones, checked_channels(channels, spread.twist_count()));
     return array_of(std::span(found));
 }
 
@@ -77,19 +77,19 @@ py::array_t<float> apply(const Timed<TwistSpread>& spread, const ArrayLike& poin
     const auto curved = one_for_each<float>(curves, "curves", spread.twist_count(), "float32");
     const auto told = checked_channels(channels, spread.twist_count());
     TwistSpreadOptions options;
-    options.amount = static_cast<float>(checked_option<TwistSpreadStage>(amount, "amount"));
+    options.amount = static_cast<float>(checked_option<TwistSpreadDefinition>(amount, "amount"));
     options.amounts = as_span(factors);
     options.curves = as_span(curved);
     options.channels = told;
     options.blend = checked_blend(blend, "blend");
     options.mix_blend = checked_blend(mix_blend, "mix_blend");
     options.threads = checked_threads(threads);
-    return applied(spread, given, out, [&](auto to) { return spread.apply(to, {bones}, options); });
+    return applied(spread, given, out, [&](auto to) { return spread.apply(to, bones, options); });
 }
 
 }  // namespace
 
-void bind_stage(py::module_& m, TwistSpreadStage) {
+void bind_stage(py::module_& m, TwistSpreadDefinition) {
     auto type = stage_class<TwistSpread>(
         m, "TwistSpread",
         R"(The stage `twist_spread` for one mesh: spreads the twist of a bone against the next along the bone, as twist

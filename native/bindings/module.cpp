@@ -6,9 +6,9 @@ namespace sinew::bindings {
 
 // The only list of what is bound besides the stages, each in bind_NAME.cpp: types before the functions that take or
 // return them.
-#define SINEW_BINDINGS(bind)                                                                         \
-    bind(compiled_in) bind(methods) bind(skeleton) bind(transforms) bind(interpolate) bind(deformer) \
-        bind(normals) bind(skinned_normals) bind(precompute) bind(threads) bind(weights) bind(crossings)
+#define SINEW_BINDINGS(bind)                                                                        \
+    bind(compiled_in) bind(methods) bind(transforms) bind(interpolate) bind(deformer) bind(normals) \
+        bind(skinned_normals) bind(precompute) bind(threads) bind(weights) bind(crossings)
 
 #define SINEW_DECLARE(name) void bind_##name(py::module_& m);
 SINEW_BINDINGS(SINEW_DECLARE)

@@ -28,35 +28,30 @@ MixWeights checked_mix(const PackedMesh& mesh, std::span<const float> weights, s
 
 }  // namespace
 
-Owned<Deformer::State> Deformer::State::alone(const BindData& data, const MethodInfo& method,
-                                              const std::optional<MixData>& mix_data) {
-    const auto packed = std::make_shared<PackedBinding>(data);
-    std::vector<Lanes<float>> rest_points = std::move(packed->mesh.rest_points);
-    return make_owned<State>(packed, std::move(rest_points), method, mix_data);
-}
-
 BoneSets Deformer::State::wanted_sets() const {
-    const auto wants = [](const Kernel* kernel) { return kernel->set_rows != nullptr; };
+    const auto wants = [](const Kernel* kernel) { return kernel->rows.are_of_sets; };
     return std::ranges::any_of(kernels_in_use(), wants) ? find_bone_sets(packed->mesh) : BoneSets{};
 }
 
-Deformer::State::State(std::shared_ptr<const PackedBinding> from, std::vector<Lanes<float>> rest_points,
-                       const MethodInfo& method, const std::optional<MixData>& mix_data)
+Deformer::State::State(std::shared_ptr<const PackedBinding> from, const MethodInfo& method,
+                       const std::optional<MixData>& mix_data)
     : packed(std::move(from)),
-      own_rest_points(std::move(rest_points)),
       methods{checked_method("method", method, *packed),
               mix_data ? checked_method("mix", mix_data->method, *packed) : 0},
       kernels{&kernel_at(methods[0]), &kernel_at(methods[1])},
       mix(mix_data ? std::optional(checked_mix(packed->mesh, mix_data->weights, packed->vertex_count))
                    : std::nullopt),
       sets(wanted_sets()),
-      palettes(kernels_in_use(), packed->mesh.used_bones.size(), sets.bones.size()) {}
+      palettes({kernels[0]->rows, kernels[1]->rows}, mix ? 2 : 1, packed->mesh.used_bones.size(),
+               sets.bones.size()) {}
 
 Deformer::Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix)
-    : state_(make_owned<State>(binding.packed(), std::vector<Lanes<float>>{}, method, mix)) {}
+    : state_(make_owned<State>(binding.packed(), method, mix)) {}
 
 Deformer::Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix)
-    : state_(State::alone(data, method, mix)) {}
+    : Deformer(Binding(data), method, mix) {
+    state_->own_rest_points = state_->packed->mesh.rest_points;
+}
 
 const MethodInfo& Deformer::method() const noexcept { return kMethods[state_->methods[0]]; }
 const MethodInfo* Deformer::mixed_method() const noexcept {
@@ -89,16 +84,21 @@ PreparedPose Deformer::State::prepare(const Pose& pose, const DeformOptions& opt
     PreparedPose prepared{SpaceRows(pose.bones_from_model),
                           {valid_values(kMethods[methods[0]], options.parameters),
                            valid_values(kMethods[methods[1]], options.mix_parameters)}};
-    const Bones bones{.used = packed->mesh.used_bones,
+    const std::vector<std::int32_t>& used = packed->mesh.used_bones;
+    // Nearly always all of them.
+    std::size_t posed = used.size();
+    while (posed > 0 && static_cast<std::size_t>(used[posed - 1]) >= pose.posed_from_rest.size()) --posed;
+    const Bones bones{.used = used,
+                      .posed = posed,
                       .stretched = packed->stretched_bones,
                       .rest_bones = packed->rest_bones,
+                      .pairs = &packed->mesh.pairs,
                       .sets = &sets,
                       .pose = pose};
     for (std::size_t k = 0; k < kernels_in_use().size(); ++k) {
         Palette& palette = reading.palette(k);
-        // Methods whose kernel can keep signs have that parameter first.
-        fill_palette(*kernels[k], packed->mesh.pairs, bones, Signs::are_kept(prepared.parameters[k]),
-                     palette);
+        const bool keeps_signs = Signs::are_kept(kMethods[methods[k]], prepared.parameters[k]);
+        kernels[k]->fill_palette[target_in_use()](bones, keeps_signs, palette);
         prepared.palettes[k] = &palette;
     }
     return prepared;
@@ -112,7 +112,7 @@ void Deformer::State::deform(const PreparedPose& pose, std::span<const Lanes<flo
         frames[k] = {.mesh = &mesh,
                      .rest_points = rest_points.data(),
                      .vertex_data = packed->vertex_data[methods[k]].get(),
-                     .bones = kernels[k]->set_rows != nullptr ? sets.entries.data() : mesh.bones.data(),
+                     .bones = kernels[k]->rows.are_of_sets ? sets.entries.data() : mesh.bones.data(),
                      .palette = pose.palettes[k],
                      .spaces = pose.space_rows.spaces(),
                      .parameters = pose.parameters[k].data(),

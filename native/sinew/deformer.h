@@ -9,7 +9,7 @@
 #include "sinew/base/owned.h"
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
-#include "sinew/skeleton/pose.h"
+#include "sinew/pose/pose.h"
 
 namespace sinew {
 
@@ -38,7 +38,7 @@ public:
     /// Throws also for a method that is not in the list of methods, and one whose vertex data the binding lacks.
     Deformer(const Binding& binding, const MethodInfo& method, const std::optional<MixData>& mix = {});
 
-    /// Constructs its own binding, which no other deformer shares.
+    /// Constructs its own binding, which no other deformer shares, with memory for other rest points.
     Deformer(const BindData& data, const MethodInfo& method, const std::optional<MixData>& mix = {});
 
     [[nodiscard]] const MethodInfo& method() const noexcept;

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sinew/deformer.h"
-#include "sinew/lanes/palette_store.h"
 #include "sinew/methods/packed_binding.h"
+#include "sinew/pose/palette_store.h"
 #include "sinew/stages/mix/mix_blocks.h"
 
 namespace sinew {
@@ -26,12 +26,8 @@ struct PreparedPose {
 };
 
 struct Deformer::State {
-    State(std::shared_ptr<const PackedBinding> from, std::vector<Lanes<float>> rest_points,
-          const MethodInfo& method, const std::optional<MixData>& mix_data);
-
-    /// With its own binding, whose rest points it moves out of `packed`, since nothing else reads them.
-    static Owned<State> alone(const BindData& data, const MethodInfo& method,
-                              const std::optional<MixData>& mix_data);
+    State(std::shared_ptr<const PackedBinding> from, const MethodInfo& method,
+          const std::optional<MixData>& mix_data);
 
     [[nodiscard]] std::span<const Kernel* const> kernels_in_use() const {
         return std::span(kernels).first(mix ? 2 : 1);

@@ -35,7 +35,7 @@ TEST(QuaternionOrder, of_a_program_changes_no_rotation) {
 TEST(QuaternionOrder, of_a_program_changes_none_of_the_library) {
     const std::vector<std::int32_t> parents{-1, 0};
     const std::vector<Affine<float>> posed(2, Affine<float>{kThird});
-    for (const Quat<float>& third : continued_rotations(Skeleton(parents), posed)) {
+    for (const Quat<float>& third : continued_rotations(parents, posed)) {
         EXPECT_LT(error_of(third), 1e-5f);
     }
 }

@@ -14,17 +14,17 @@ LIBRARY = ROOT / "native" / "sinew"
 
 # Folder of native/sinew: the folders whose headers it may include. "" has the public headers on top. What
 # these declare is defined in the folders that may include them.
-TRANSFORMS = {"transform", "interpolate", "skeleton"}
+TRANSFORMS = {"transform", "interpolate"}
 MAY_INCLUDE = {
     "base": {"base"},
     "transform": {"transform"},
     "interpolate": {"transform", "interpolate"},
-    "skeleton": {"base", *TRANSFORMS},
     "mesh": {"base", *TRANSFORMS, "mesh", ""},
-    "lanes": {"base", *TRANSFORMS, "mesh", "lanes"},
-    "methods": {"base", *TRANSFORMS, "mesh", "lanes", "methods", ""},
-    "stages": {"base", *TRANSFORMS, "mesh", "lanes", "methods", "stages", ""},
-    "normals": {"base", *TRANSFORMS, "mesh", "lanes", "normals", ""},
+    "pose": {"base", *TRANSFORMS, "mesh", "pose"},
+    "lanes": {"base", *TRANSFORMS, "mesh", "pose", "lanes"},
+    "methods": {"base", *TRANSFORMS, "mesh", "pose", "lanes", "methods", ""},
+    "stages": {"base", *TRANSFORMS, "mesh", "pose", "lanes", "methods", "stages", ""},
+    "normals": {"base", *TRANSFORMS, "mesh", "pose", "lanes", "normals", ""},
 }
 MAY_INCLUDE[""] = set(MAY_INCLUDE) | {""}
 
@@ -110,7 +110,7 @@ LIBRARY_FILES = sources(LIBRARY, ".h", ".cpp")
 
 def test_there_is_something_to_read():
     folders = {folder_of(path) for path in LIBRARY_FILES}
-    assert {"transform", "skeleton", "methods", "stages", ""} <= folders
+    assert {"transform", "pose", "methods", "stages", ""} <= folders
     assert folders <= set(MAY_INCLUDE), "a new folder of native/sinew needs its row in MAY_INCLUDE"
 
 
@@ -258,19 +258,3 @@ def test_only_attach_walks_stacks_of_modifiers():
     files = room_files("deform", "ui", "features", "jobs", "commands")
     found = {path.name: walks_of_modifiers(path.read_text(encoding="utf-8")) for path in files}
     assert {name: lines for name, lines in found.items() if lines} == {}
-
-
-def test_the_extension_checks_all_names_that_it_uses_of_the_library():
-    """addon/native.py reports in a sentence if an older library lacks it."""
-    addon = ROOT / "addon"
-    tree = ast.parse((addon / "native.py").read_text(encoding="utf-8"))
-    names = next(n.value for n in tree.body if isinstance(n, ast.Assign) and n.targets[0].id == "NAMES")
-    listed = {node.value for node in ast.walk(names) if isinstance(node, ast.Constant)}
-    used = set()
-    for path in sources(addon, ".py"):
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            if isinstance(node, ast.ImportFrom) and node.module == "sinew" and not node.level:
-                used |= {alias.name for alias in node.names}
-            elif isinstance(node, ast.Attribute) and getattr(node.value, "id", "") == "sinew":
-                used.add(node.attr)
-    assert used - {"__version__", "__file__"} == listed

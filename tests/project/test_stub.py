@@ -1,6 +1,6 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Protects the stub, which editors and type checkers read: it is what ./dev stub makes of the module, and
-describes everything."""
+"""Protects what ./dev stub makes of the library: the stub, which editors and type checkers read and which
+describes everything, and lists in files that can not read the library's."""
 
 import ast
 import subprocess
@@ -9,6 +9,7 @@ from typing import get_args
 
 import pytest
 import sinew
+from make_stub import lists
 
 ROOT = Path(__file__).resolve().parents[2]
 STUB = ROOT / "native" / "python" / "sinew" / "_native"
@@ -24,6 +25,12 @@ def test_the_stub_is_made_of_the_module(tmp_path):
     words = [PYTHON, ROOT / "tools" / "make_stub.py", "--out", tmp_path / "made"]
     subprocess.run(words, check=True, timeout=120)
     assert contents(tmp_path / "made") == contents(STUB), "./dev stub writes it anew"
+
+
+@pytest.mark.skipif("ddm" not in {method.name for method in sinew.methods()}, reason="built without ddm")
+def test_lists_are_those_of_the_library():
+    for path, text in lists().items():
+        assert path.read_text(encoding="utf-8") == text, f"{path.name}: ./dev stub writes its list anew"
 
 
 @pytest.mark.parametrize("path", sorted(STUB.iterdir()), ids=lambda path: path.name)

@@ -43,10 +43,6 @@ def skinned(binding, method="dq"):
     return sinew.Deformer(binding, method).deform(np.tile(POSED[1], (binding.bone_count, 1, 1)))
 
 
-def on_skeleton(method):
-    return lambda **given: getattr(sinew.Skeleton([-1, 0]), method)(**given)
-
-
 def kept(make, method, probe):
     """Calls a method of an object that, where it is refused, afterwards gives what it gave before."""
 
@@ -127,12 +123,6 @@ CALLS = {
         {"radius": 1.0},
     ),
     "vertex data": (lambda **given: sinew.Deformer(**SKIN, **given), {"vertex_data": {"cor": POINTS}}),
-    "Skeleton": (sinew.Skeleton, {"parents": [-1, 0]}),
-    "root_relative": (on_skeleton("root_relative"), {"transforms": POSED}),
-    "update_branch": (
-        on_skeleton("update_branch"),
-        {"root_relative": POSED, "transforms": POSED[::-1], "bone": 1},
-    ),
     "catmull_rom": (spline.catmull_rom, SPLINE),
     "catmull_rom_vector": (spline.catmull_rom_vector, SPLINE),
     "between": (interpolate.between, {"a": KEYS, "b": KEYS[::-1], "t": 0.5}),
@@ -178,8 +168,6 @@ MORE = {
     "deform_normals": OPTIONS | OF_POSE,
     "centres": {"exact": True, "threads": 2, "gives_way": False},
     "moments": {"exact": True, "threads": 2, "gives_way": False},
-    "root_relative": {"root": POSED[1]},
-    "update_branch": {"root": POSED[1]},
     "catmull_rom": {"method": "sclerp"},
     "between": {"method": "dlb"},
     "blend": {"method": "sclerp", "signs": "as_given"},

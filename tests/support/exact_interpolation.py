@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Checks with 50 digits: sinew.interpolate, sinew.spline, sinew.Skeleton."""
+"""Checks with 50 digits: sinew.interpolate, sinew.spline."""
 
 import functools
 import itertools
@@ -492,71 +492,6 @@ def catmull_rom_vector(_name, function):
                 agree_motions(got, name, want, size, signed=True)
 
 
-# --- Skeletons
-
-
-@functools.cache
-def skeletons():
-    """int32 [GROUPS, BONES]: parents."""
-    rng = np.random.default_rng(108)
-    parents = rng.integers(-1, np.arange(1, BONES + 1) - 1, (GROUPS, BONES), endpoint=False)
-    parents[:, 0] = -1
-    return parents.astype(np.int32)
-
-
-@functools.cache
-def relative_wanted(has_changed):
-    """Exact motions relative to the root [COUNT], with the roots' own as the last GROUPS; and sizes. If
-    changed, bone 2's motion is another one."""
-    cases, roots = motions(109), motions(110).exact.take(np.arange(GROUPS))
-    own = motions(111).exact if has_changed else cases.exact
-    at = np.arange(GROUPS) * BONES
-    found = []
-    for bone in range(BONES):
-        before = [roots.q.copy(), roots.t.copy()]
-        for other in range(bone):
-            is_parent = skeletons()[:, bone] == other
-            before[0] = np.where(is_parent, found[other].q, before[0])
-            before[1] = np.where(is_parent, found[other].t, before[1])
-        source = own if has_changed and bone == 2 else cases.exact
-        found.append(e.compose(Motion(*before), source.take(at + bone)))
-    motion = Motion(
-        *(np.stack(part, axis=2).reshape(len(part[0]), COUNT) for part in zip(*found, strict=True))
-    )
-    size = (
-        cases.size.reshape(GROUPS, BONES).sum(axis=1) + motions(110).size[:GROUPS] + motions(111).size[at + 2]
-    )
-    return motion, np.repeat(size, BONES)
-
-
-def of_groups(cases, name, dtype):
-    array = cases.of(name, dtype)
-    return array.reshape(GROUPS, BONES, *array.shape[1:])
-
-
-def root_relative_and_update_branch(_name, _function):
-    for name, dtype in itertools.product(LAYOUTS, FLOATS):
-        bones, roots = of_groups(motions(109), name, dtype), motions(110).of(name, dtype)
-        changed = bones.copy()
-        changed[:, 2] = of_groups(motions(111), name, dtype)[:, 2]
-        before, after = [], []
-        for g, parents in enumerate(skeletons()):
-            skeleton = sinew.Skeleton(parents)
-            before.append(skeleton.root_relative(bones[g], roots[g]))
-            after.append(skeleton.update_branch(before[-1], changed[g], 2, roots[g]))
-            others = [b for b in range(BONES) if not _is_below(parents, b)]
-            np.testing.assert_array_equal(after[-1][others], before[-1][others])
-        for has_changed, got in enumerate((before, after)):
-            motion, size = relative_wanted(bool(has_changed))
-            agree_motions(np.concatenate(got), name, in_layout(motion, name), size, signed=True)
-
-
-def _is_below(parents, bone):
-    while bone > 2:
-        bone = parents[bone]
-    return bone == 2
-
-
 BLENDS = {
     "matrix_log": blend_of_logarithms,
     **{method: blend_of_sums(method) for method in ("matrix_linear", "matrix_polar", "qv_nlerp", "dlb")},
@@ -569,6 +504,4 @@ CHECKS = {
     **{f"interpolate.blend.{method}": BLENDS[method] for method in LAYOUT_OF},
     **{f"spline.catmull_rom.{method}": catmull_rom(method) for method in LAYOUT_OF},
     "spline.catmull_rom_vector": catmull_rom_vector,
-    "Skeleton.root_relative": root_relative_and_update_branch,
-    "Skeleton.update_branch": root_relative_and_update_branch,
 }

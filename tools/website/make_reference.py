@@ -289,7 +289,7 @@ def public_headers() -> list[str]:
     if listed is None:
         raise ValueError("native/sinew/CMakeLists.txt lists no headers")
     top = sorted({path.name for path in HEADERS.glob("*.h")} - {"sinew.h", "deformer_state.h"})
-    folders = ("transform", "interpolate", "skeleton")
+    folders = ("transform", "interpolate")
     others = [path for f in folders for path in (HEADERS / f).glob("*.h")]
     others += [path for path in HEADERS.glob("stages/*/*.h") if path.stem == path.parent.name]
     return [*top, *listed[1].split(), *sorted(path.relative_to(HEADERS).as_posix() for path in others)]

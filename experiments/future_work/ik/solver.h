@@ -6,8 +6,8 @@
 #include <span>
 
 #include "future_work/ik/rotation_limits.h"
+#include "future_work/ik/skeleton.h"
 #include "sinew/base/owned.h"
-#include "sinew/skeleton/skeleton.h"
 #include "sinew/transform/dual_quat.h"
 
 namespace sinew {

@@ -11,8 +11,7 @@
 #include "sinew/lanes/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// Calls on_set(b, after) for consecutive blocks of [begin, end) with the same bones, possibly none, and on_own(b) for
 /// a block whose vertices have their own.
@@ -89,8 +88,7 @@ HWY_INLINE Points<D> vector_to_model(D d, const Spaces& spaces, const Points<D>&
     return spaces.model_from_bones == nullptr ? v : displaced_vector(d, spaces.model_from_bones, v);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

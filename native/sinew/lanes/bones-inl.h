@@ -8,13 +8,13 @@
 #endif
 
 #include <algorithm>
+#include <bit>
 
 #include "sinew/lanes/lanes-inl.h"
 #include "sinew/transform/split_scale.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// Numbers in a bone's row, unless its method has more: two Float4.
 inline constexpr std::size_t kRow = 8;
@@ -33,7 +33,8 @@ HWY_INLINE const float* row_of(const Palette& palette, std::int32_t bone) {
     return palette.bones[kNumbers / 4 * static_cast<std::size_t>(bone)].value.data();
 }
 
-/// Computes the displacement of `rest` by the scale of `bone`. Returns false if the bone has no scale.
+/// Computes what the scale of `bone` adds to the vertex at `rest`: its displacement, rotated as the bone is. Returns
+/// false if the bone has no scale.
 template <class D>
 HWY_INLINE bool scaled(D d, const Palette& palette, std::int32_t bone, const Points<D>& rest,
                        Points<D>& added) {
@@ -56,15 +57,15 @@ struct Motions {
     BonePoints translation;
 };
 
-/// The motions of the bones `used`, at most as many as there are lanes. Further lanes repeat the last bone.
-HWY_INLINE Motions load_motions(std::span<const Affine<float>> posed_from_rest,
-                                std::span<const std::int32_t> used) {
+/// The motions of the posed bones from `first` on, one in each lane. Further lanes repeat the last bone.
+HWY_INLINE Motions load_motions(const Bones& bones, std::size_t first) {
     const BoneTag d;
+    const std::span used = bones.used.subspan(first, bones.posed - first);
+    const Affine<float>* const motions = bones.pose.posed_from_rest.data();
     alignas(64) double numbers[12][hn::MaxLanes(BoneTag())];
     for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-        const std::int32_t bone = used[std::min(lane, used.size() - 1)];
         static_assert(sizeof(Affine<float>) == 12 * sizeof(float));
-        const float* const from = &posed_from_rest[static_cast<std::size_t>(bone)].linear[0].x;
+        const float* const from = &motions[used[std::min(lane, used.size() - 1)]].linear[0].x;
         for (std::size_t i = 0; i < 12; ++i) numbers[i][lane] = static_cast<double>(from[i]);
     }
     const auto column = [&](std::size_t i) HWY_ATTR {
@@ -123,18 +124,35 @@ HWY_INLINE Quats rotations(const Motions& m) {
     return {hn::Mul(scale, q.w), times<BoneTag>(scale, q.v)};
 }
 
-/// Kernel::bone_rows for a method that blends rotations.
-///
-/// Rows  write_row(rotation, translation, row) writes the numbers of a rigid motion
+/// Sets Palette::may_need_absolute_sum from the sizes, once per frame for each pair of bones, so that the test runs for
+/// few vertices.
+inline void find_absolute_sums(const Bones& bones, Palette& palette) {
+    const hn::CappedTag<float, kLanes> d;
+    const hn::RebindToSigned<decltype(d)> indices;
+    const auto ratio = hn::Set(d, kMaxSizeRatio * kMaxSizeRatio);
+    std::fill_n(palette.may_need_absolute_sum, bones.used.size(), std::uint8_t{0});
+    for (std::size_t i = 0; i < bones.pairs->first.size(); i += hn::Lanes(d)) {
+        const std::int32_t* const first_bones = &bones.pairs->first[i];
+        const auto first = hn::GatherIndex(d, palette.sizes, hn::LoadU(indices, first_bones));
+        const auto later = hn::GatherIndex(d, palette.sizes, hn::LoadU(indices, &bones.pairs->later[i]));
+        std::uint8_t bits[8] = {};
+        hn::StoreMaskBits(d, hn::Not(hn::Lt(first, hn::Mul(ratio, later))), bits);
+        for (auto pairs_left = static_cast<std::uint32_t>(bits[0] | bits[1] << 8); pairs_left != 0;
+             pairs_left &= pairs_left - 1) {
+            palette.may_need_absolute_sum[first_bones[std::countr_zero(pairs_left)]] = 1;
+        }
+    }
+}
+
+/// Writes the rows and sizes of all posed bones as if they were rigid, and adds the indices of those that are not to
+/// palette.scaled, of which there are `scaled`. Returns how many there are then.
 template <class Rows>
-void rigid_bone_rows(const Bones& all, Palette& palette) {
+HWY_INLINE std::size_t write_rigid_rows(const Bones& bones, std::size_t scaled, Palette& palette) {
     const BoneTag d;
-    const std::span<const std::int32_t> used = all.used;
     constexpr std::size_t kMax = hn::MaxLanes(BoneTag());
-    for (std::size_t i = 0; i < used.size(); i += kMax) {
-        const auto bones = used.subspan(i, std::min(kMax, used.size() - i));
-        const Motions motions = load_motions(all.pose.posed_from_rest, bones);
-        constexpr std::size_t kNumbers = Rows::kNumbers;
+    constexpr std::size_t kNumbers = Rows::kNumbers;
+    for (std::size_t i = 0; i < bones.posed; i += kMax) {
+        const Motions motions = load_motions(bones, i);
         BoneVec row[kNumbers];
         Rows::write_row(rotations(motions), motions.translation, row);
         alignas(64) double numbers[kNumbers][kMax];
@@ -145,32 +163,91 @@ void rigid_bone_rows(const Bones& all, Palette& palette) {
         const hn::Rebind<float, BoneTag> floats;
         hn::StoreU(hn::DemoteTo(floats, sizes), floats, palette.sizes + i);
         hn::Store(hn::IfThenElseZero(is_rotation(motions), hn::Set(d, 1.0)), d, rigid);
-        for (std::size_t lane = 0; lane < bones.size(); ++lane) {
-            if (rigid[lane] == 0.0) {
-                palette.scaled[palette.scaled_count++] = static_cast<std::int32_t>(i + lane);
-            }
+        const std::size_t count = std::min(kMax, bones.posed - i);
+        for (std::size_t lane = 0; lane < count; ++lane) {
+            if (rigid[lane] == 0.0) palette.scaled[scaled++] = static_cast<std::int32_t>(i + lane);
             float* const to = palette.bones[kNumbers / 4 * (i + lane)].value.data();
             for (std::size_t k = 0; k < kNumbers; ++k) to[k] = static_cast<float>(numbers[k][lane]);
         }
     }
+    return scaled;
 }
+
+/// Writes the row and the size of one bone.
+template <class Rows>
+void write_row(std::size_t bone, QuatVec<double> motion, Palette& palette) {
+    Quat<double>& q = motion.rotation;
+    // Without a sign, as rotations() gives it.
+    if (Rows::kSignedFloat4s == 0 && q.w < 0.0) q = -q;
+    const BoneTag d;
+    const auto vector = [d](const auto& v) HWY_ATTR {
+        return BonePoints{hn::Set(d, v.x), hn::Set(d, v.y), hn::Set(d, v.z)};
+    };
+    BoneVec row[Rows::kNumbers];
+    Rows::write_row({hn::Set(d, q.w), vector(q)}, vector(motion.translation), row);
+    float* const to = palette.bones[Rows::kNumbers / 4 * bone].value.data();
+    for (std::size_t k = 0; k < Rows::kNumbers; ++k) to[k] = static_cast<float>(hn::GetLane(row[k]));
+    palette.sizes[bone] = size_of(motion.translation);
+}
+
+/// Writes the row and the scale of a bone by Method::prepare().
+template <class Method, class Rows>
+void write_scaled_row(const Bones& bones, std::size_t bone, Palette& palette) {
+    const auto motion = Method::prepare(cast<double>(bones.motion(bone)), bones.rest_bone(bone));
+    const QuatVec<double> rigid = to_quat_vec(motion.rigid);
+    write_row<Rows>(bone, rigid, palette);
+    if (!motion.has_scale) return;
+    if (!palette.any_scale) std::fill_n(palette.has_scale, bones.used.size(), std::uint8_t{0});
+    palette.any_scale = true;
+    palette.has_scale[bone] = 1;
+    Rows::write_scale(rigid.rotation, motion.scale, palette.scales + kDisplacementRows * bone);
+}
+
+/// Kernel::fill_palette for a method that blends rotations.
+template <class Method, class Rows>
+void fill_rigid(const Bones& bones, bool keeps_signs, Palette& palette) {
+    palette.any_scale = false;
+    palette.keeps_signs = keeps_signs;
+    std::size_t scaled = 0;
+    for (const std::int32_t bone : bones.stretched) {
+        if (static_cast<std::size_t>(bone) < bones.posed) palette.scaled[scaled++] = bone;
+    }
+    scaled = write_rigid_rows<Rows>(bones, scaled, palette);
+    for (std::size_t bone = bones.posed; bone < bones.used.size(); ++bone) write_row<Rows>(bone, {}, palette);
+    for (const std::int32_t bone : std::span(palette.scaled, scaled)) {
+        write_scaled_row<Method, Rows>(bones, static_cast<std::size_t>(bone), palette);
+    }
+    if (keeps_signs) take_signs(bones, Rows::kNumbers / 4, Rows::kSignedFloat4s, palette);
+    find_absolute_sums(bones, palette);
+}
+
+/// Rows with a translation among their numbers: kFirst, and two more, each kStep behind the one before.
+template <std::size_t kSize, std::size_t kFirst, std::size_t kStep>
+struct TranslatedRows {
+    static constexpr std::size_t kNumbers = kSize;
+    static constexpr RowLayout kRows{kNumbers / 4};
+
+    /// Adds what the bone's scale adds to the translation.
+    template <class D>
+    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
+                                     const Points<D>& rest, Sum<D, kSize>& sum) {
+        Points<D> added;
+        if (!scaled(d, palette, bone, rest, added)) return;
+        Vec<D>* const translation = sum.value + kFirst;
+        translation[0] = hn::MulAdd(weight, added.x, translation[0]);
+        translation[kStep] = hn::MulAdd(weight, added.y, translation[kStep]);
+        translation[2 * kStep] = hn::MulAdd(weight, added.z, translation[2 * kStep]);
+    }
+
+    static void write_scale(const Quat<double>& rotation, const Affine<double>& scale, Float4* rows) {
+        write_rotated_scale(rotation, scale, rows);
+    }
+};
 
 /// What methods have in common that rotate a vertex about a point which the bones move. A row is the rotation
 /// (w, x, y, z), then the displacement rows of the motion.
-struct CentreRows {
-    static constexpr std::size_t kNumbers = 16;
-
-    /// Adds the displacement by the bone's scale, rotated, to the translation.
-    template <class D>
-    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
-                                     const Points<D>& rest, Sum<D, kNumbers>& sum) {
-        Points<D> added;
-        if (!scaled(d, palette, bone, rest, added)) return;
-        const Points<D> rotated = rotated_by(d, row_of<kNumbers>(palette, bone), added);
-        sum.value[7] = hn::MulAdd(weight, rotated.x, sum.value[7]);
-        sum.value[11] = hn::MulAdd(weight, rotated.y, sum.value[11]);
-        sum.value[15] = hn::MulAdd(weight, rotated.z, sum.value[15]);
-    }
+struct CentreRows : TranslatedRows<16, 7, 4> {
+    static constexpr std::size_t kSignedFloat4s = 1;
 
     static HWY_INLINE void write_row(const Quats& q, const BonePoints& translation, BoneVec* row) {
         const BoneTag d;
@@ -236,8 +313,7 @@ struct LinearRows : CentreRows {
     }
 };
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -10,8 +10,7 @@
 #include "sinew/lanes/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// c[0] + c[1] x + c[2] x^2 + ...
 template <class D, class Number, std::size_t kCount>
@@ -50,8 +49,7 @@ struct ExponentialFactors {
     }
 };
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

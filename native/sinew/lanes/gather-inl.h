@@ -12,8 +12,7 @@
 #include "sinew/lanes/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 #if HWY_TARGET != HWY_SCALAR
 
@@ -93,8 +92,7 @@ HWY_INLINE Points<D> load_deformed(D d, const MeshPointers& from, std::size_t b,
     return points_of<true>(d, points, vertices);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/pose/palette.h"
 
 namespace sinew {
 
@@ -50,13 +50,13 @@ struct Frame {
     Vec3<float>* points;
 };
 
-/// How the library deforms whole meshes with one method: five functions. Registered in methods/NAME/NAME.cpp by
-/// SINEW_KERNEL.
+/// How the library deforms whole meshes with one method. SINEW_KERNEL (lanes/lanes-inl.h) makes it of a struct in
+/// methods/NAME/NAME.cpp.
 struct Kernel {
+    using Deform = void(const Frame& frame, std::size_t begin, std::size_t end);
+    using FillPalette = void(const Bones& bones, bool keeps_signs, Palette& palette);
     using PackVertexData = std::unique_ptr<const PackedVertexData>(const PackedMesh& mesh,
                                                                    std::span<const float> values);
-    using OfBones = void(const Bones& bones, Palette& palette);
-    using Deform = void(const Frame& frame, std::size_t begin, std::size_t end);
 
     /// Deforms the blocks [begin, end). Agrees with the method's definition.
     ///
@@ -65,49 +65,13 @@ struct Kernel {
     /// may differ by rounding, since only some of them have a fused multiply-add.
     OfTargets<Deform> deform;
 
-    /// The rows in Palette::bones of a bone that does not move. Every bone there has as many.
-    std::span<const Float4> rest_row;
+    /// Fills a palette. Bones that the pose lacks stay at rest.
+    ///
+    /// keeps_signs  give rows the signs of Pose::rotations, and keep them
+    OfTargets<FillPalette> fill_palette;
 
-    /// How many Float4 of a row change sign with the rotation; 0 if the signs can not be kept.
-    std::size_t signed_float4s = 0;
-
-    /// Writes the rows of bones.used, all of which are posed, and their sizes. A method that blends rotations
-    /// treats every bone as rigid, and adds the indices of those that are not to palette.scaled.
-    OfTargets<OfBones> bone_rows{};
-
-    /// Writes the rows and scales of the bones in palette.scaled. Null for a method that has no use for them: it
-    /// changes the space in the rows of bones.
-    OfBones* scaled_bone_rows = nullptr;
-
-    /// In place of both, for a method with a row for each bone of each set of bones: writes those, from
-    /// palette.posed. Else null.
-    OfBones* set_rows = nullptr;
-
-    /// Packs checked vertex data [MethodInfo::vertex_floats for each vertex or row]. Null if the method has none.
-    PackVertexData* pack_vertex_data = nullptr;
-
-    /// The number of rows in a palette.
-    [[nodiscard]] std::size_t row_count(std::size_t bones, std::size_t entries_of_sets) const noexcept {
-        return set_rows != nullptr ? entries_of_sets : bones;
-    }
-    /// Whether it keeps the scale of bones apart.
-    [[nodiscard]] bool keeps_scale() const noexcept {
-        return scaled_bone_rows != nullptr || set_rows != nullptr;
-    }
+    RowLayout rows;
+    PackVertexData* pack_vertex_data = nullptr;  // of checked vertex data; null if the method has none
 };
-
-// Defines Method::kernel(), from the functions of the file that are compiled for each instruction set. Further
-// arguments are the other members of Kernel, in their order.
-#define SINEW_KERNEL(Method, ...)                                                      \
-    const Kernel& Method::kernel() noexcept {                                          \
-        static constexpr Kernel kKernel{.deform = SINEW_TARGETS(deform), __VA_ARGS__}; \
-        return kKernel;                                                                \
-    }
-
-/// Fills `palette`. Bones that the pose lacks stay at rest.
-///
-/// keeps_signs  give rows the signs of Pose::rotations, and keep them
-void fill_palette(const Kernel& kernel, const BonePairs& pairs, const Bones& bones, bool keeps_signs,
-                  Palette& palette) noexcept;
 
 }  // namespace sinew

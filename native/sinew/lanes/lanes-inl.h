@@ -14,9 +14,26 @@
 #include "hwy/highway.h"
 #include "sinew/lanes/kernel.h"
 
+// Defines Method::kernel() from the static functions of a struct that is compiled for each instruction set, and the
+// layout of its rows. Further arguments are other members of Kernel.
+#undef SINEW_KERNEL
+#if HWY_ONCE
+#define SINEW_KERNEL(Method, Struct, ...)                                                    \
+    namespace sinew {                                                                        \
+    const Kernel& Method::kernel() noexcept {                                                \
+        static constexpr Kernel kKernel{.deform = SINEW_TARGETS(Struct::deform),             \
+                                        .fill_palette = SINEW_TARGETS(Struct::fill_palette), \
+                                        .rows = HWY_NAMESPACE::Struct::kRows,                \
+                                        __VA_ARGS__};                                        \
+        return kKernel;                                                                      \
+    }                                                                                        \
+    }
+#else
+#define SINEW_KERNEL(Method, Struct, ...)
+#endif
+
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 namespace hn = hwy::HWY_NAMESPACE;
 
@@ -165,14 +182,6 @@ HWY_INLINE Points<D> add_cross(const Points<D>& a, const Points<D>& b, const Poi
 template <class D>
 HWY_INLINE Points<D> add_scaled(const Points<D>& a, Vec<D> scale, const Points<D>& b) {
     return {hn::MulAdd(scale, b.x, a.x), hn::MulAdd(scale, b.y, a.y), hn::MulAdd(scale, b.z, a.z)};
-}
-
-/// Rotates `v` by the unit quaternion `q` (w, x, y, z).
-template <class D>
-HWY_INLINE Points<D> rotated_by(D d, const float* q, const Points<D>& v) {
-    const Points<D> axis = in_all_lanes(d, q + 1);
-    const Points<D> inner = add_scaled<D>(cross<D>(axis, v), hn::Set(d, q[0]), v);
-    return add_scaled<D>(v, hn::Set(d, 2.0f), cross<D>(axis, inner));
 }
 
 /// The squared length of a quaternion [4].
@@ -381,8 +390,7 @@ HWY_INLINE bool is_summed_absolutely(const Palette& palette, const std::int32_t*
            sinew::needs_absolute_sum(palette, bones, count);
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

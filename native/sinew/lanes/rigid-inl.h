@@ -21,8 +21,7 @@
 #include "sinew/lanes/bones-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// A row of numbers for each bone, which are summed by weights. A row's first four numbers are the quaternion, or
 /// numbers without a sign. Numbers after the first kRow are the same in all rows of a set of bones, except in
@@ -30,6 +29,8 @@ namespace HWY_NAMESPACE {
 ///
 /// kNumbers        numbers in a row, a multiple of 4
 /// kSignedFloat4s  how many Float4 of a row change sign with the quaternion: 0 to 2
+/// write_row       writes the numbers of rigid motions, one in each lane (not for rows of sets)
+/// write_scale     writes the Palette::scales of a bone, of what add_scale reads
 /// add_scale       adds the effect of a bone's scale to a sum, with the weight and with the weight that has the sign
 ///                 of the row
 template <class Rows>
@@ -567,17 +568,20 @@ void deform_rigid(const Frame& frame, std::size_t begin, std::size_t end) {
         [&](std::size_t b) HWY_ATTR { of_block(frame, b); });
 }
 
-// Defines the functions of a kernel that are compiled for each instruction set, for one that is deform_rigid().
-#ifndef SINEW_RIGID_FUNCTIONS
-#define SINEW_RIGID_FUNCTIONS(Rows)                                       \
-    void deform(const Frame& frame, std::size_t begin, std::size_t end) { \
-        deform_rigid<Rows>(frame, begin, end);                            \
-    }                                                                     \
-    void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<Rows>(bones, palette); }
-#endif
+/// The functions of a kernel for a method that blends rotations.
+template <class Method, class Rows>
+struct RigidFunctions {
+    RigidFunctions() = delete;  // its functions need no object
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        deform_rigid<Rows>(frame, begin, end);
+    }
+    static void fill_palette(const Bones& bones, bool keeps_signs, Palette& palette) {
+        fill_rigid<Method, Rows>(bones, keeps_signs, palette);
+    }
+};
+
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #endif

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string_view>
 
@@ -24,8 +25,18 @@ struct Signs {
 
     /// Whether quaternions are summed with the signs that they have: those of Pose::rotations. Else each
     /// has the sign that brings it nearer to the sum of those before it.
-    [[nodiscard]] static constexpr bool are_kept(std::span<const double> parameters) noexcept {
-        return !parameters.empty() && parameters[0] == 1.0;
+    ///
+    /// values  of kParameters, or none
+    [[nodiscard]] static constexpr bool are_kept(std::span<const double> values) noexcept {
+        return !values.empty() && values[0] == 1.0;
+    }
+
+    /// values  of all parameters of `method`
+    [[nodiscard]] static constexpr bool are_kept(const MethodInfo& method,
+                                                 std::span<const double> values) noexcept {
+        const auto found = std::ranges::find(method.parameters, kParameters[0].id, &Parameter::id);
+        if (found == method.parameters.end()) return false;
+        return values[static_cast<std::size_t>(found - method.parameters.begin())] == 1.0;
     }
 };
 

@@ -2,24 +2,18 @@
 // Normals of whole meshes: see normals.h for the definition. Products and sums are rounded one by one, in
 // Blender's order and without fused multiply-add, so that results equal Blender's and are the same on each
 // instruction set.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <cstdint>
 #include <limits>
 
-#include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/normals/normal_mesh.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/normals/normal_kernel.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/normals/normal_kernel.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/gather-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 // A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
@@ -388,8 +382,7 @@ void customise(const NormalFrame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
 #include "sinew/normals.h"
+#include "sinew/pose/palette.h"
 
 namespace sinew {
 

@@ -1,23 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Normals that move with the skin: see skinned_normals.h for the definition.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/normals/skinned_normal_kernel.h"
 
 #include <limits>
 
-#include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/normals/skinned_normal_kernel.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/normals/skinned_normal_kernel.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/gather-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 // A vector with a smaller squared length has no direction.
 constexpr float kShortest = 1e-35f;
@@ -101,8 +95,7 @@ void of_frames(const SkinnedNormalFrame& f, std::size_t begin, std::size_t end) 
     });
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

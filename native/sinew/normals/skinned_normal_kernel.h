@@ -6,7 +6,7 @@
 #include <cstdint>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/palette.h"
+#include "sinew/pose/palette.h"
 
 namespace sinew {
 

@@ -8,7 +8,7 @@
 #include "sinew/base/status.h"
 #include "sinew/binding.h"
 #include "sinew/export.h"
-#include "sinew/skeleton/pose.h"
+#include "sinew/transform/affine.h"
 
 namespace sinew {
 

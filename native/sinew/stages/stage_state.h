@@ -48,11 +48,11 @@ struct BoneStage::State {
 
     [[nodiscard]] StageFrame frame(Vec3<float>* points) const noexcept;
 
-    /// The motion of a bone, by its number in the pose.
-    [[nodiscard]] static Affine<double> motion(const Pose& pose, std::int32_t bone) noexcept {
+    /// The motion of the bone with this number in the pose.
+    [[nodiscard]] static Affine<double> motion(std::span<const Affine<float>> posed_from_rest,
+                                               std::int32_t bone) noexcept {
         const auto number = static_cast<std::size_t>(bone);
-        return number < pose.posed_from_rest.size() ? cast<double>(pose.posed_from_rest[number])
-                                                    : Affine<double>{};
+        return number < posed_from_rest.size() ? cast<double>(posed_from_rest[number]) : Affine<double>{};
     }
 
     std::shared_ptr<const PackedBinding> packed;

@@ -11,7 +11,8 @@
 namespace sinew {
 
 // The only list of stages, by their definitions, in the order in which they run after a method.
-#define SINEW_STAGES(each) each(Mix) each(TwistSpreadStage) each(BulgeLimitStage) each(DeltaMushStage)
+#define SINEW_STAGES(each) \
+    each(Mix) each(TwistSpreadDefinition) each(BulgeLimitDefinition) each(DeltaMushDefinition)
 
 /// The facts about each stage, in the order of the list.
 #define SINEW_INFO(Stage) Stage::info,

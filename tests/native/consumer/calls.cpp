@@ -12,7 +12,6 @@
 #include "sinew/interpolate/methods.h"
 #include "sinew/methods/cor/centres_of_rotation.h"
 #include "sinew/normals.h"
-#include "sinew/skeleton/forward_kinematics.h"
 #include "sinew/skinned_normals.h"
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
@@ -156,8 +155,6 @@ int main() {
     spread_twists();
     find_centres();
     interpolate();
-    const std::vector<std::int32_t> parents{-1, 0};
-    expect(sinew::Skeleton(parents).bone_count() == 2, "a skeleton has its bones");
     expect(sinew::simd_target() == sinew::simd_targets().front(), "the fastest kernels are in use");
     sinew::use_simd_target(sinew::simd_targets().back());
     deform();

@@ -12,7 +12,7 @@
 #include "scene.h"
 #include "sinew/base/simd.h"
 #include "sinew/base/x86_support.h"
-#include "sinew/skeleton/continued_rotations.h"
+#include "sinew/pose/continued_rotations.h"
 
 namespace sinew::test {
 namespace {
@@ -206,7 +206,7 @@ TEST_P(Kernels, keep_the_signs_of_a_chain) {
             Scene scene = scene_of_chain(degrees, scaled);
             const Deformer deformer(scene.data(), method());
             const auto shorter = deformed(deformer, scene);
-            scene.rotations = continued_rotations(Skeleton(parents), scene.posed_from_rest);
+            scene.rotations = continued_rotations(parents, scene.posed_from_rest);
             const auto expected = in_double(method(), scene, kept);
             const auto points = deformed(deformer, scene, {.parameters = kept}, {}, scene.rotations);
             EXPECT_LT(largest_error(points, expected), 10 * kTolerance) << degrees << scaled;

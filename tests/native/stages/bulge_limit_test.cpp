@@ -35,21 +35,21 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const std::vector<Bo
                                         const std::vector<Vec3<float>>& points, BulgeForm form,
                                         double strength) {
     std::vector<BoneSegment<double>> rest_segments;
-    std::vector<BulgeLimitStage::Bone<double>> bones;
+    std::vector<BulgeLimitDefinition::Bone<double>> bones;
     for (std::size_t bone = 0; bone < segments.size(); ++bone) {
         const BoneSegment<double> rest{Vec3<double>(segments[bone].head), Vec3<double>(segments[bone].tail)};
         const auto motion = cast<double>(scene.posed_from_rest[bone]);
         rest_segments.push_back(rest);
         bones.push_back({{transform_point(motion, rest.head), transform_point(motion, rest.tail)},
-                         BulgeLimitStage::stretch(motion.linear, rest)});
+                         BulgeLimitDefinition::stretch(motion.linear, rest)});
     }
     std::vector<Vec3<double>> result;
     for (std::size_t vertex = 0; vertex < points.size(); ++vertex) {
         const auto influences = normalised_influences_of<double>(scene, vertex);
-        const double apart = BulgeLimitStage::rest_distance<double>(form, rest_segments, influences,
-                                                                    Vec3<double>(scene.rest_points[vertex]));
-        result.push_back(BulgeLimitStage::deform_vertex<double>(form, bones, influences, apart, strength,
-                                                                Vec3<double>(points[vertex])));
+        const double apart = BulgeLimitDefinition::rest_distance<double>(
+            form, rest_segments, influences, Vec3<double>(scene.rest_points[vertex]));
+        result.push_back(BulgeLimitDefinition::deform_vertex<double>(form, bones, influences, apart, strength,
+                                                                     Vec3<double>(points[vertex])));
     }
     return result;
 }

@@ -58,8 +58,8 @@ public:
         std::vector<Vec3<double>> details(result.size(), Vec3<double>(0.0));
         weights.assign(result.size(), 0.0);
         for_each_corner([&](std::size_t before, std::size_t at, std::size_t after) {
-            const auto at_rest = DeltaMushStage::corner(rest[before], rest[at], rest[after]);
-            const auto posed = DeltaMushStage::corner(result[before], result[at], result[after]);
+            const auto at_rest = DeltaMushDefinition::corner(rest[before], rest[at], rest[after]);
+            const auto posed = DeltaMushDefinition::corner(result[before], result[at], result[after]);
             const Vec3<double> taken = Vec3<double>(mesh_.rest_points[at]) - rest[at];
             details[at] += posed.weight * (posed.axes * (glm::transpose(at_rest.axes) * taken));
             weights[at] += posed.weight;
@@ -104,8 +104,8 @@ private:
                 for (const std::size_t neighbour : neighbours_[v]) around.push_back(before[neighbour]);
                 const std::span<const Vec3<double>> neighbours(around);
                 points[v] = settings_.type == SmoothType::simple
-                                ? DeltaMushStage::smoothed(before[v], neighbours, factors_[v])
-                                : DeltaMushStage::smoothed_by_length(before[v], neighbours, factors_[v]);
+                                ? DeltaMushDefinition::smoothed(before[v], neighbours, factors_[v])
+                                : DeltaMushDefinition::smoothed_by_length(before[v], neighbours, factors_[v]);
             }
         }
         return points;

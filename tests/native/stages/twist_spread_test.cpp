@@ -88,13 +88,13 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
             if (!options.channels.empty()) {
                 const TwistChannels<double> told{glm::normalize(Quat<double>(options.channels[i].rotation)),
                                                  Vec3<double>(options.channels[i].angles)};
-                expected = TwistSpreadStage::expected(told, rotation,
-                                                      to_quat(rotation_keeping_y(tip_rest.linear)), axis);
+                expected = TwistSpreadDefinition::expected(
+                    told, rotation, to_quat(rotation_keeping_y(tip_rest.linear)), axis);
             }
-            const auto [angle, around, part] = TwistSpreadStage::read(rotation, axis, expected);
+            const auto [angle, around, part] = TwistSpreadDefinition::read(rotation, axis, expected);
             const double factor =
                 static_cast<double>(options.amount) * static_cast<double>(options.amounts[i]);
-            const TwistSpreadStage::Bone<double> bone{
+            const TwistSpreadDefinition::Bone<double> bone{
                 motion_of(twist.bone),
                 head,
                 axis,
@@ -114,9 +114,9 @@ std::vector<Vec3<double>> by_definition(const Scene& scene, const TwistSpreadDat
             }
             if (weight == 0.0 && !(below > 0.0)) continue;
             const double mix = data.mix.empty() ? 0.0 : static_cast<double>(data.mix[vertex]);
-            point =
-                TwistSpreadStage::deform_vertex(bone, options.blend, options.mix_blend, mix, weight, below,
-                                                static_cast<double>(data.weights[vertex]), rest, point);
+            point = TwistSpreadDefinition::deform_vertex(bone, options.blend, options.mix_blend, mix, weight,
+                                                         below, static_cast<double>(data.weights[vertex]),
+                                                         rest, point);
         }
         result.push_back(point);
     }
@@ -139,7 +139,7 @@ TEST_P(SpreadTwists, kernel_agrees_with_the_definition) {
         const std::vector<float> amounts{1.0f, 0.8f, 0.6f, 1.0f, 0.0f, 1.0f};
         const std::vector<float> curves{0.0f, 1.0f, -1.0f, 0.5f, 0.0f, -0.25f};
         const auto before = deformed(Deformer(scene.data(), Lbs::info), scene);
-        constexpr auto kBlendCount = static_cast<int>(std::size(TwistSpreadStage::kBlends));
+        constexpr auto kBlendCount = static_cast<int>(std::size(TwistSpreadDefinition::kBlends));
         for (int pair = 0; pair < kBlendCount * kBlendCount; ++pair) {
             const auto first = static_cast<TwistBlend>(pair / kBlendCount);
             const auto second = static_cast<TwistBlend>(pair % kBlendCount);

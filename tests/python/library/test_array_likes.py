@@ -71,14 +71,6 @@ def test_pickles_keep_bones_that_are_named_without_weight():
     assert (nothing.vertex_count, nothing.bone_count) == (0, 0)
 
 
-def test_skeletons_can_be_pickled():
-    skeleton = again(sinew.Skeleton([-1, 0, 0]))
-    bones = np.tile(np.eye(4), (3, 1, 1)) * 2
-    np.testing.assert_array_equal(
-        skeleton.root_relative(bones), sinew.Skeleton([-1, 0, 0]).root_relative(bones)
-    )
-
-
 @pytest.mark.parametrize(
     ("of", "state", "message"),
     [
@@ -92,7 +84,6 @@ def test_skeletons_can_be_pickled():
         ),
         (sinew.Deformer, ((), "lbs", None), "state: expected a tuple of 6"),
         (sinew.Deformer, (([[0, 0, 0]], [0, 0], [], [], None, None), "l", None), "method: expected one of"),
-        (sinew.Skeleton, (), "state: expected a tuple of 1"),
     ],
 )
 def test_states_of_other_things_are_refused(of, state, message):

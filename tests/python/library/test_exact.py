@@ -25,14 +25,13 @@ CHECKS = {**exact_transforms.CHECKS, **exact_interpolation.CHECKS}
 
 
 def public_functions():
-    """The functions of these modules and of Skeleton, by "module.function"."""
+    """The functions of these modules, by "module.function"."""
     found = {
         f"{module}.{name}": getattr(getattr(sinew, module), name)
         for module in MODULES
         for name in dir(getattr(sinew, module))
         if not name.startswith("_")
     }
-    found |= {f"Skeleton.{name}": method for name, method in vars(sinew.Skeleton).items() if name[0] != "_"}
     return {name: what for name, what in found.items() if inspect.isroutine(what)}
 
 

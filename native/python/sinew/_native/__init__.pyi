@@ -11,7 +11,7 @@ from . import dual
 from . import quat
 from . import interpolate
 from . import spline
-__all__: list = ['Parameter', 'Method', 'Stage', 'methods', 'stages', 'Skeleton', 'Binding', 'Deformer', 'Normals', 'SkinnedNormals', 'Precomputation', 'centres_of_rotation', 'direct_delta_mush', 'Lock', 'thread_id', 'keep_thread_state', 'weights_in_memory', 'crossing_triangles', 'TwistSpread', 'BulgeLimit', 'DeltaMush']
+__all__: list = ['Parameter', 'Method', 'Stage', 'methods', 'stages', 'Binding', 'Deformer', 'Normals', 'SkinnedNormals', 'Precomputation', 'centres_of_rotation', 'direct_delta_mush', 'Lock', 'thread_id', 'keep_thread_state', 'weights_in_memory', 'crossing_triangles', 'TwistSpread', 'BulgeLimit', 'DeltaMush']
 class Parameter:
     """A setting of a method or of a stage."""
     def __repr__(self) -> str: ...
@@ -96,35 +96,6 @@ class Stage:
     @property
     def source(self) -> str:
         """The papers."""
-class Skeleton:
-    """A hierarchy of bones in which parents precede their children.
-
-    Its methods take each bone relative to its parent, in any layout of sinew.affine, sinew.quat_vec and
-    sinew.dual_quat. Can be pickled.
-    """
-    def __getstate__(self) -> tuple[numpy.typing.NDArray[numpy.int32]]: ...
-    def __init__(self, parents: numpy.typing.ArrayLike) -> None:
-        """parents: int32 [bones], the index of each bone's parent, -1 for a root. ValueError if a parent does not
-            precede its child.
-        """
-    def __repr__(self) -> str: ...
-    def __setstate__(self, arg0: typing.Any) -> None: ...
-    def root_relative(self, transforms: numpy.typing.ArrayLike, root: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[typing.Any]:
-        """Each bone relative to the root, in the layout of `transforms` (Smith 2013, algorithm 1).
-
-        transforms: [bones, 4, 4] or [bones, 3, 4], for which the result is [bones, 4, 4]; [bones, 7]; [bones, 8].
-        root: None, or a transform that is applied after that of every bone without a parent.
-        """
-    def update_branch(self, root_relative: numpy.typing.ArrayLike, transforms: numpy.typing.ArrayLike, bone: typing.SupportsIndex, root: numpy.typing.ArrayLike | None = None) -> numpy.typing.NDArray[typing.Any]:
-        """The result of root_relative() after a change of one bone: computes only that bone and its descendants.
-
-        root_relative: the result before the change, in the layout of `transforms`.
-        transforms, root: as for root_relative().
-        bone: the index of the changed bone.
-        """
-    @property
-    def bone_count(self) -> int:
-        """Number of bones."""
 class Binding:
     """A mesh bound to bones. Immutable; the deformers made from it share its memory.
 

@@ -1,21 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Solves with a BlockFactor on lanes.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
 
-#include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/methods/ddm/block_factor.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/ddm/block_kernel.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/ddm/block_kernel.cpp"
+#include "sinew/lanes/all_targets.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
@@ -210,8 +204,7 @@ void solve(const BlockFactor& factor, double nothing, double* x, std::uint8_t* i
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -1,26 +1,19 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Direct delta mush on lanes. Rows are those of CentreRows. The vertex data is BoneMoments.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/ddm/ddm.h"
 
 #include <algorithm>
 #include <cstring>
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
 #include "sinew/methods/ddm/bone_moments.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/ddm/ddm.cpp"
-#include "hwy/foreach_target.h"
-//
+#define SINEW_THIS_FILE "sinew/methods/ddm/ddm.cpp"
 #include "hwy/cache_control.h"
-#include "hwy/highway.h"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 namespace {
 
 // The nearest rotation is found if the two parts of a step, tangents of half angles, have at most this squared
@@ -40,11 +33,6 @@ inline constexpr std::size_t kDdmNumbers = CentreRows::kNumbers;
 // Rows of further bones are computed again for each vector.
 inline constexpr std::size_t kMaxPrepared = kMaxResolved;
 
-/// The form that copy_aligned() expects.
-struct SignedRows : CentreRows {
-    static constexpr std::size_t kSignedFloat4s = 1;
-};
-
 /// The bones of a range of blocks, at least one, with rows in the form in which they are added.
 ///
 /// The last 12 numbers of a row apply to points in model space. Unless the sum of bones is absolute, these are
@@ -60,7 +48,7 @@ public:
         is_absolute = sinew::needs_absolute_sum(palette_, bones, count);
         // Within 45 degrees of the first, all are within 90 degrees of each other.
         is_resolved = !is_absolute && count <= kMaxPrepared &&
-                      copy_aligned<SignedRows, true>(palette_, bones, count, rows_) > kCosine45;
+                      copy_aligned<CentreRows, true>(palette_, bones, count, rows_) > kCosine45;
         if (HWY_LIKELY(is_resolved)) {
             for (std::size_t k = 0; k < count; ++k) to_model(rows_ + kDdmNumbers * k);
             return;
@@ -528,8 +516,7 @@ HWY_INLINE Points<D> add_scales(D d, const Frame& frame, std::size_t b, std::siz
                                                      : weights + kLanes * (k - 1);
         Points<D> added;
         if (!scaled(d, *frame.palette, bones[k], rest, added)) continue;
-        const Points<D> rotated = rotated_by(d, row_of<kDdmNumbers>(*frame.palette, bones[k]), added);
-        total = add_scaled<D>(total, hn::Load(d, of_bone), rotated);
+        total = add_scaled<D>(total, hn::Load(d, of_bone), added);
     }
     return total;
 }
@@ -646,28 +633,20 @@ void deform_by(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void deform(const Frame& frame, std::size_t begin, std::size_t end) {
-    if (frame.vertex_data == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
-    switch (static_cast<int>(frame.parameters[0])) {
-        case 1: return deform_by<Variant::quaternion>(frame, begin, end);
-        case 2: return deform_by<Variant::weights>(frame, begin, end);
-        default: return deform_by<Variant::nearest>(frame, begin, end);
-    }
-}
-
-void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
-
 }  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+
+struct DdmKernel : LinearRows, RigidFunctions<Ddm, LinearRows> {
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        if (frame.vertex_data == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
+        switch (static_cast<int>(frame.parameters[0])) {
+            case 1: return deform_by<Variant::quaternion>(frame, begin, end);
+            case 2: return deform_by<Variant::weights>(frame, begin, end);
+            default: return deform_by<Variant::nearest>(frame, begin, end);
+        }
+    }
+};
+
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#if HWY_ONCE
-namespace sinew {
-
-SINEW_KERNEL(Ddm, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Ddm, kCentreRestRow, write_centre_bone>,
-             .pack_vertex_data = pack_moments)
-
-}  // namespace sinew
-#endif
+SINEW_KERNEL(Ddm, DdmKernel, .pack_vertex_data = pack_moments)

@@ -5,25 +5,17 @@
 // relative to the blend is then a quotient of rotations and a difference of points, and only the error of the
 // point counts. Logarithms are those of motions that follow the blend; those of motions before it, as in
 // methods/dib/dib.h, give the same blend.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/dib/dib.h"
 
 #include <numbers>
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/dib/dib.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/dib/dib.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 namespace {
 
 /// By which share of lengths a point may be off.
@@ -153,8 +145,7 @@ struct SharedBones {
         for (std::size_t i = 0; i < 4; ++i) image.rotation[i] = hn::Set(d, row[i]);
         image.point = displaced(d, row + 4, rest);
         Points<D> added;
-        if (scaled(d, palette, bones[k], rest, added))
-            image.point = add<D>(image.point, rotated_by(d, row, added));
+        if (scaled(d, palette, bones[k], rest, added)) image.point = add<D>(image.point, added);
     }
 };
 
@@ -363,31 +354,16 @@ void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
         [&](std::size_t b) HWY_ATTR { deform_own<kKeepsSigns>(frame, b); });
 }
 
-void deform(const Frame& frame, std::size_t begin, std::size_t end) {
-    const auto of_blocks = frame.palette->keeps_signs ? &deform_blocks<true> : &deform_blocks<false>;
-    of_blocks(frame, begin, end);
-}
-
-void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
-
 }  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+
+struct DibKernel : CentreRows, RigidFunctions<IterativeDq, CentreRows> {
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        const auto of_blocks = frame.palette->keeps_signs ? &deform_blocks<true> : &deform_blocks<false>;
+        of_blocks(frame, begin, end);
+    }
+};
+
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#if HWY_ONCE
-namespace sinew {
-namespace {
-
-void write_bone(const IterativeDq::Bone<double>& bone, Float4* row, Float4* scale) {
-    write_centre_bone({to_quat_vec(bone.rigid), bone.scale, bone.has_scale}, row, scale);
-}
-
-}  // namespace
-
-SINEW_KERNEL(IterativeDq, .rest_row = kCentreRestRow, .signed_float4s = 1,
-             .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<IterativeDq, kCentreRestRow, write_bone>)
-
-}  // namespace sinew
-#endif
+SINEW_KERNEL(IterativeDq, DibKernel)

@@ -1,40 +1,37 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Dual quaternion skinning on lanes. A row is the real part and the dual part, each (w, x, y, z).
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/dq/dq.h"
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/dq/dq.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/dq/dq.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
-struct DqKernel {
+struct DqKernel : RigidFunctions<Dq, DqKernel> {
     static constexpr std::size_t kNumbers = kRow;
+    static constexpr RowLayout kRows{kNumbers / 4};
     static constexpr std::size_t kSignedFloat4s = 2;
 
-    /// Adds the displacement by the bone's scale to the dual part: + 1/2 real * displacement.
+    /// Adds to the dual part + 1/2 added * real, for what the bone's scale adds.
     template <class D>
     static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D>,
                                      Vec<D> signed_weight, const Points<D>& rest, Sum<D>& sum) {
         Points<D> added;
         if (!scaled(d, palette, bone, rest, added)) return;
-        const float* const row = row_of(palette, bone);
-        const Points<D> axis = in_all_lanes(d, row + 1);
-        const Points<D> rotated = add_scaled<D>(cross<D>(axis, added), hn::Set(d, row[0]), added);
+        const float* const real = row_of(palette, bone);
+        const Points<D> axis = in_all_lanes(d, real + 1);
+        const Points<D> vector = add_scaled<D>(cross<D>(added, axis), hn::Set(d, real[0]), added);
         const Vec<D> half = hn::Mul(signed_weight, hn::Set(d, 0.5f));
         sum.value[4] = hn::NegMulAdd(half, dot<D>(axis, added), sum.value[4]);
-        sum.value[5] = hn::MulAdd(half, rotated.x, sum.value[5]);
-        sum.value[6] = hn::MulAdd(half, rotated.y, sum.value[6]);
-        sum.value[7] = hn::MulAdd(half, rotated.z, sum.value[7]);
+        sum.value[5] = hn::MulAdd(half, vector.x, sum.value[5]);
+        sum.value[6] = hn::MulAdd(half, vector.y, sum.value[6]);
+        sum.value[7] = hn::MulAdd(half, vector.z, sum.value[7]);
+    }
+
+    static void write_scale(const Quat<double>& rotation, const Affine<double>& scale, Float4* rows) {
+        write_rotated_scale(rotation, scale, rows);
     }
 
     /// Divides once by the squared norm instead of taking a square root, as in methods/dq/dq.h.
@@ -67,31 +64,7 @@ struct DqKernel {
     }
 };
 
-namespace {
-
-SINEW_RIGID_FUNCTIONS(DqKernel)
-
-}  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#if HWY_ONCE
-namespace sinew {
-namespace {
-
-constexpr Float4 kRestRow[] = {{{1, 0, 0, 0}}, {{0, 0, 0, 0}}};
-
-void write_bone(const Dq::Bone<double>& bone, Float4* row, Float4* scale) {
-    row[0] = float4(bone.rigid.real);
-    row[1] = float4(bone.rigid.dual);
-    write_displacement(bone.scale, scale);
-}
-
-}  // namespace
-
-SINEW_KERNEL(Dq, .rest_row = kRestRow, .signed_float4s = 2, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Dq, kRestRow, write_bone>)
-
-}  // namespace sinew
-#endif
+SINEW_KERNEL(Dq, DqKernel)

@@ -1,33 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Linear blending on lanes. A bone is the columns x, y, z and translation of its displacement, each followed by a
 // 0. Bones are summed as described at Palette.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/lbs/lbs.h"
 
 #include <cstring>
 #include <limits>
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/kernel.h"
 #include "sinew/transform/convert.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/lbs/lbs.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/lbs/lbs.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/block_loop-inl.h"
-
-namespace sinew {
-
-/// Kernel::bone_rows for bones that are posed in any space, in double.
-void linear_rows_between_spaces(const Bones& bones, Palette& palette);
-
-}  // namespace sinew
+#include "sinew/lanes/bones-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 namespace {
 
 /// Returns `v`, and keeps GCC from loading it again for each of its uses. On AVX-512, where the kernel is bound
@@ -284,23 +271,32 @@ void deform_sets(const Frame& frame, std::size_t begin, std::size_t end) {
     }
 }
 
-void deform(const Frame& frame, std::size_t begin, std::size_t end) {
-    for_each_set(
-        frame, begin, end, [&](std::size_t b, std::size_t after) HWY_ATTR { deform_sets(frame, b, after); },
-        [&](std::size_t b) HWY_ATTR { deform_own_bones(frame, b); });
+/// Writes the columns of each bone's displacement, for bones that are posed in any space, in double.
+void rows_between_spaces(const Bones& bones, Palette& palette) {
+    const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
+    const Affine<double> model_from_bones = inverse(bones_from_model);
+    for (std::size_t i = 0; i < bones.posed; ++i) {
+        const Affine<double> motion = model_from_bones * cast<double>(bones.motion(i)) * bones_from_model;
+        const Mat3<double> m = motion.linear - Mat3<double>(1.0);
+        Float4* const columns = &palette.bones[kLbsColumns * i];
+        for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
+        const Vec3<double>& translation = motion.translation;
+        columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
+        palette.sizes[i] =
+            size_of(translation, glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
+    }
 }
 
 #if HWY_TARGET != HWY_SCALAR
 
-/// Writes the columns of each bone's displacement.
+/// Writes them for bones that are posed in model space.
 void rows_in_model(const Bones& bones, Palette& palette) {
-    const std::span<const std::int32_t> used = bones.used;
     const hn::CappedTag<float, 4> d;
     const auto three = hn::FirstN(d, 3);
     // The identity's columns as whole vectors, so that each takes one load.
     alignas(16) static constexpr float kIdentity[3][4] = {{1, 0, 0, 0}, {0, 1, 0, 0}, {0, 0, 1, 0}};
-    for (std::size_t i = 0; i < used.size(); ++i) {
-        const float* const from = &bones.pose.posed_from_rest[static_cast<std::size_t>(used[i])].linear[0].x;
+    for (std::size_t i = 0; i < bones.posed; ++i) {
+        const float* const from = &bones.motion(i).linear[0].x;
         float* const to = palette.bones[kLbsColumns * i].value.data();
         auto squares = hn::Zero(d);
         for (std::size_t c = 0; c < 3; ++c) {
@@ -321,42 +317,34 @@ void rows_in_model(const Bones& bones, Palette& palette) {
 
 #else
 
-void rows_in_model(const Bones& bones, Palette& palette) { linear_rows_between_spaces(bones, palette); }
+void rows_in_model(const Bones& bones, Palette& palette) { rows_between_spaces(bones, palette); }
 
 #endif
-
-void bone_rows(const Bones& bones, Palette& palette) {
-    is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
-                                             : linear_rows_between_spaces(bones, palette);
-}
 
 }  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+
+struct LbsKernel {
+    static constexpr RowLayout kRows{.float4s = kLbsColumns, .have_scales = false};
+
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        for_each_set(
+            frame, begin, end,
+            [&](std::size_t b, std::size_t after) HWY_ATTR { deform_sets(frame, b, after); },
+            [&](std::size_t b) HWY_ATTR { deform_own_bones(frame, b); });
+    }
+
+    static void fill_palette(const Bones& bones, bool, Palette& palette) {
+        palette.any_scale = palette.keeps_signs = false;
+        const std::size_t at_rest = bones.used.size() - bones.posed;
+        std::fill_n(palette.bones + kLbsColumns * bones.posed, kLbsColumns * at_rest, Float4{});
+        std::fill_n(palette.sizes + bones.posed, at_rest, kMinSize * kMinSize);
+        is_identity(bones.pose.bones_from_model) ? rows_in_model(bones, palette)
+                                                 : rows_between_spaces(bones, palette);
+        find_absolute_sums(bones, palette);
+    }
+};
+
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#if HWY_ONCE
-namespace sinew {
-
-static constexpr Float4 kRestRow[HWY_NAMESPACE::kLbsColumns] = {};
-
-void linear_rows_between_spaces(const Bones& bones, Palette& palette) {
-    const auto bones_from_model = cast<double>(bones.pose.bones_from_model);
-    const Affine<double> model_from_bones = inverse(bones_from_model);
-    for (std::size_t i = 0; i < bones.used.size(); ++i) {
-        const Affine<float>& posed = bones.pose.posed_from_rest[static_cast<std::size_t>(bones.used[i])];
-        const Affine<double> motion = model_from_bones * cast<double>(posed) * bones_from_model;
-        const Mat3<double> m = motion.linear - Mat3<double>(1.0);
-        Float4* const columns = &palette.bones[std::size(kRestRow) * i];
-        for (int c = 0; c < 3; ++c) columns[c] = float4(m[c].x, m[c].y, m[c].z, 0.0);
-        const Vec3<double>& translation = motion.translation;
-        columns[3] = float4(translation.x, translation.y, translation.z, 0.0);
-        palette.sizes[i] =
-            size_of(translation, glm::dot(m[0], m[0]) + glm::dot(m[1], m[1]) + glm::dot(m[2], m[2]));
-    }
-}
-
-SINEW_KERNEL(Lbs, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows))
-
-}  // namespace sinew
-#endif
+SINEW_KERNEL(Lbs, LbsKernel)

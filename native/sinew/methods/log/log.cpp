@@ -1,36 +1,26 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Log-matrix skinning on lanes. A row is the angular and the linear part of a bone's logarithm, each (x, y, z, 0).
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/log/log.h"
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/log/log.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/log/log.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
-struct LogKernel {
-    static constexpr std::size_t kNumbers = kRow;
+struct LogKernel : TranslatedRows<kRow, 4, 1>, RigidFunctions<Log, LogKernel> {
     static constexpr std::size_t kSignedFloat4s = 0;
 
-    /// Adds the change of the linear part by the bone's scale, which Palette::scales holds.
-    template <class D>
-    static HWY_INLINE void add_scale(D d, const Palette& palette, std::int32_t bone, Vec<D> weight, Vec<D>,
-                                     const Points<D>& rest, Sum<D>& sum) {
-        Points<D> added;
-        if (!scaled(d, palette, bone, rest, added)) return;
-        sum.value[4] = hn::MulAdd(weight, added.x, sum.value[4]);
-        sum.value[5] = hn::MulAdd(weight, added.y, sum.value[5]);
-        sum.value[6] = hn::MulAdd(weight, added.z, sum.value[6]);
+    /// The linear part depends linearly on the translation, and thus on what the scale adds to the translation.
+    static void write_scale(const Quat<double>& rotation, const Affine<double>& scale, Float4* rows) {
+        const auto added = [&rotation](const Vec3<double>& displacement) {
+            return to_twist(QuatVec<double>{rotation, rotate(rotation, displacement)}).linear;
+        };
+        const Mat3<double> m = scale.linear - Mat3<double>(1.0);
+        write_displacement(Mat3<double>(added(m[0]), added(m[1]), added(m[2])), added(scale.translation),
+                           rows);
     }
 
     /// The exponential, as in transform/twist.h.
@@ -95,39 +85,7 @@ struct LogKernel {
     }
 };
 
-namespace {
-
-SINEW_RIGID_FUNCTIONS(LogKernel)
-
-}  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#if HWY_ONCE
-namespace sinew {
-namespace {
-
-constexpr Float4 kRestRow[2] = {};
-
-void write_bone(const Log::Bone<double>& bone, Float4* row, Float4* scale) {
-    const Twist<double> twist = to_twist(bone.rigid);
-    row[0] = float4(twist.angular.x, twist.angular.y, twist.angular.z, 0.0);
-    row[1] = float4(twist.linear.x, twist.linear.y, twist.linear.z, 0.0);
-    // The linear part depends linearly on the translation, and thus on what the scale adds to the translation.
-    const auto added = [&bone](const Vec3<double>& displacement) {
-        const Quat<double>& rotation = bone.rigid.rotation;
-        return to_twist(QuatVec<double>{rotation, rotate(rotation, displacement)}).linear;
-    };
-    const Mat3<double> m = bone.scale.linear - Mat3<double>(1.0);
-    write_displacement(Mat3<double>(added(m[0]), added(m[1]), added(m[2])), added(bone.scale.translation),
-                       scale);
-}
-
-}  // namespace
-
-SINEW_KERNEL(Log, .rest_row = kRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Log, kRestRow, write_bone>)
-
-}  // namespace sinew
-#endif
+SINEW_KERNEL(Log, LogKernel)

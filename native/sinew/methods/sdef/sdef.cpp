@@ -1,25 +1,17 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // Spherical deform on lanes. Rows are those of CentreRows. The vertex data is the points C, R0 and R1, and
 // whether to use them.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/methods/sdef/sdef.h"
 
 #include <cmath>
 
-#include "sinew/base/targets.h"
-#include "sinew/lanes/rigid_bones.h"
-
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/methods/sdef/sdef.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/methods/sdef/sdef.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/rigid-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 namespace {
 
 /// The two bones of a vertex.
@@ -82,8 +74,7 @@ HWY_INLINE Points<D> deformed_by(D d, const Palette& palette, const Pair& pair, 
     for (std::size_t k = 0; k < 2; ++k) {
         Points<D> moved = sinew::HWY_NAMESPACE::displacement(d, pair.rows[k] + 4, midpoints[k]);
         Points<D> added;
-        if (scaled(d, palette, pair.bones[k], rest, added))
-            moved = add<D>(moved, rotated_by(d, pair.rows[k], added));
+        if (scaled(d, palette, pair.bones[k], rest, added)) moved = add<D>(moved, added);
         displacement = k == 0 ? times<D>(weights[0], moved) : add_scaled<D>(displacement, weights[1], moved);
     }
     const Vec<D> first_share = kSlerp ? slerp_weight(d, weights[0], pair.squared_angle) : weights[0];
@@ -156,25 +147,17 @@ void deform_blocks(const Frame& frame, std::size_t begin, std::size_t end) {
         });
 }
 
-void deform(const Frame& frame, std::size_t begin, std::size_t end) {
-    if (frame.vertex_data == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
-    const bool by_slerp = frame.parameters[0] == 1.0;
-    by_slerp ? deform_blocks<true>(frame, begin, end) : deform_blocks<false>(frame, begin, end);
-}
-
-void bone_rows(const Bones& bones, Palette& palette) { rigid_bone_rows<CentreRows>(bones, palette); }
-
 }  // namespace
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+
+struct SdefKernel : LinearRows, RigidFunctions<Sdef, LinearRows> {
+    static void deform(const Frame& frame, std::size_t begin, std::size_t end) {
+        if (frame.vertex_data == nullptr) return deform_rigid<LinearRows>(frame, begin, end);
+        const bool by_slerp = frame.parameters[0] == 1.0;
+        by_slerp ? deform_blocks<true>(frame, begin, end) : deform_blocks<false>(frame, begin, end);
+    }
+};
+
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
-#if HWY_ONCE
-namespace sinew {
-
-SINEW_KERNEL(Sdef, .rest_row = kCentreRestRow, .bone_rows = SINEW_TARGETS(bone_rows),
-             .scaled_bone_rows = scaled_bone_rows<Sdef, kCentreRestRow, write_centre_bone>,
-             .pack_vertex_data = VertexNumbers<Sdef::info.vertex_floats>::pack)
-
-}  // namespace sinew
-#endif
+SINEW_KERNEL(Sdef, SdefKernel, .pack_vertex_data = VertexNumbers<Sdef::info.vertex_floats>::pack)

@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/stages/bulge_limit/bulge_limit.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "sinew/base/targets.h"
 #include "sinew/stages/stage_state.h"
 #include "sinew/transform/split_scale.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/stages/bulge_limit/bulge_limit.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/stages/bulge_limit/bulge_limit.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/gather-inl.h"
 
@@ -44,8 +39,7 @@ struct BulgeFrame : StageFrame {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// The point of the bone's segment nearest to `p`.
 template <class D>
@@ -195,7 +189,7 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end,
              std::span<Lanes<float>> mean_distances, std::span<Lanes<float>> heaviest_distances) {
     const One d;
     const MeshPointers pointers = pointers_of(frame);
-    constexpr auto kAllowance = static_cast<float>(BulgeLimitStage::kAllowance);
+    constexpr auto kAllowance = static_cast<float>(BulgeLimitDefinition::kAllowance);
     for (std::size_t b = begin; b < end; ++b) {
         for (std::size_t lane = 0; lane < kLanes; ++lane) {
             const Points<One> p = load_rest(d, pointers, frame.spaces, b, lane);
@@ -221,8 +215,7 @@ void measure(const BulgeFrame& frame, std::size_t begin, std::size_t end,
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
@@ -289,12 +282,12 @@ struct BulgeLimit::State : BoneStage::State {
     }
 
     /// Poses the segments. Returns whether a bone is stretched.
-    bool prepare(const Pose& pose) const noexcept {
+    bool prepare(std::span<const Affine<float>> posed_from_rest) const noexcept {
         bool is_stretched = false;
         for (std::size_t i = 0; i < segments.size(); ++i) {
-            const Affine<double> posed = motion(pose, mesh.used_bones[i]);
+            const Affine<double> posed = motion(posed_from_rest, mesh.used_bones[i]);
             const double stretch =
-                is_orthonormal(posed.linear) ? 1.0 : BulgeLimitStage::stretch(posed.linear, at_rest[i]);
+                is_orthonormal(posed.linear) ? 1.0 : BulgeLimitDefinition::stretch(posed.linear, at_rest[i]);
             is_stretched = is_stretched || stretch != 1.0;
             const auto& [head, tail] = at_rest[i];
             segments[i] = bulge_bone({transform_point(posed, head), transform_point(posed, tail)}, stretch);
@@ -314,13 +307,13 @@ struct BulgeLimit::State : BoneStage::State {
 BulgeLimit::BulgeLimit(const Binding& binding, const BulgeLimitData& data)
     : BoneStage(BoneStage::State::make<State>(binding, data)) {}
 
-Status BulgeLimit::apply(std::span<Vec3<float>> points, const Pose& pose,
+Status BulgeLimit::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                          const BulgeLimitOptions& options) const noexcept {
     const auto& state = static_cast<const State&>(*state_);
     if (points.size() != vertex_count()) return Status::size;
     const std::scoped_lock lock(state.mutex);
     BulgeFrame frame = state.bulge_frame(points.data());
-    frame.is_stretched = state.prepare(pose);
+    frame.is_stretched = state.prepare(posed_from_rest);
     frame.form = options.form;
     frame.strength = std::isnan(options.strength) ? 1.0f : std::clamp(options.strength, 0.0f, 1.0f);
     parallel_for_blocks(state.mesh, points.size(), options.threads, [&](std::size_t begin, std::size_t end) {

@@ -22,7 +22,7 @@ struct BoneSegment {
     Vec3<T> tail;
 };
 
-/// Which bones of a vertex BulgeLimitStage measures the distance to. In the order of BulgeLimitStage::kForms.
+/// Which bones of a vertex BulgeLimitDefinition measures the distance to. In the order of BulgeLimitDefinition::kForms.
 enum class BulgeForm {
     continuous,  // all of them, weighted
     kim_han,     // only the heaviest (the first, if several are equal): tears the surface where that changes
@@ -30,7 +30,7 @@ enum class BulgeForm {
 
 /// Limit Bulge: moves a vertex of two or more bones back towards them where blending took it farther from them
 /// than it is at rest, such as the tip of a bent elbow.
-struct BulgeLimitStage {
+struct BulgeLimitDefinition {
     static constexpr std::string_view kForms[] = {"continuous", "kim_han"};
     static constexpr Parameter kParameters[] = {
         {"enabled", "Limit Bulge", "Keep vertices from bulging away from their bones", "",
@@ -171,11 +171,11 @@ public:
 
     /// Limits the points in place.
     ///
-    /// points  [vertices] deformed, model space
-    /// pose    only its bones are read: the space is that of the rest points
+    /// points           [vertices] deformed, model space
+    /// posed_from_rest  [bones] finite
     ///
     /// Vertices with fewer than two bones are not changed, nor is any vertex in the rest pose, bit for bit.
-    Status apply(std::span<Vec3<float>> points, const Pose& pose,
+    Status apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                  const BulgeLimitOptions& options = {}) const noexcept;
 
 private:

@@ -29,7 +29,7 @@ constexpr double kShareOfShortest = 0.1;
 void check(std::span<const Vec3<float>> rest_points, const DeltaMushSettings& settings,
            std::size_t vertices) {
     check_points(rest_points, vertices);
-    const auto most = static_cast<std::size_t>(DeltaMushStage::kMaxIterations);
+    const auto most = static_cast<std::size_t>(DeltaMushDefinition::kMaxIterations);
     if (settings.iterations > most) {
         fail("iterations", "at most " + std::to_string(most), std::to_string(settings.iterations));
     }
@@ -87,7 +87,8 @@ Amount amount_of(const MushMesh& mesh, std::span<const Vec3<float>> rest_points,
     // What the factors of all iterations must sum to, times the squared length of edges.
     const double wanted = (settings.type == SmoothType::length_weighted ? 4.0 : 2.0) * radius * radius;
     const double iterations = std::ceil(wanted / (static_cast<double>(settings.factor) * *shortest));
-    amount.iterations = static_cast<std::size_t>(std::clamp(iterations, 1.0, DeltaMushStage::kMaxIterations));
+    amount.iterations =
+        static_cast<std::size_t>(std::clamp(iterations, 1.0, DeltaMushDefinition::kMaxIterations));
     for (std::size_t i = 0; i < squared.size(); ++i) {
         const double factor = wanted / (static_cast<double>(amount.iterations) * squared[i]);
         amount.factors[i] = static_cast<float>(std::min(factor, static_cast<double>(settings.factor)));

@@ -20,7 +20,7 @@ namespace sinew {
 /// Delta mush (Mancewicz et al. 2014): smooths the deformed mesh, which removes creases and bulges, and then adds
 /// the details that the same smoothing removed from the rest mesh, in frames that follow the smoothed surface.
 /// Equals Blender's Corrective Smooth modifier after the Armature modifier.
-struct DeltaMushStage {
+struct DeltaMushDefinition {
     /// In the order of SmoothType.
     static constexpr std::string_view kSmoothTypes[] = {"simple", "length_weighted"};
     static constexpr double kMaxIterations = 1000.0;
@@ -132,12 +132,12 @@ private:
 /// Limit of DeltaMush. More is refused.
 inline constexpr std::size_t kMaxMushVertices = 0x1FFFFFFF;  // 2^29 - 1
 
-/// How neighbours are weighted. In the order of DeltaMushStage::kSmoothTypes.
+/// How neighbours are weighted. In the order of DeltaMushDefinition::kSmoothTypes.
 enum class SmoothType { simple, length_weighted };
 
 /// How the stage `delta_mush` smooths.
 struct DeltaMushSettings {
-    /// Number of smoothing iterations, at most DeltaMushStage::kMaxIterations. Not used with a radius.
+    /// Number of smoothing iterations, at most DeltaMushDefinition::kMaxIterations. Not used with a radius.
     std::size_t iterations = 5;
     /// How far the smoothing reaches, in units of the points; 0: use `iterations`.
     ///
@@ -148,7 +148,7 @@ struct DeltaMushSettings {
     /// edges get a smaller factor.
     ///
     /// Limits: the shortest tenth reaches less far, and so do all vertices if n would exceed
-    /// DeltaMushStage::kMaxIterations. Where a vertex has edges of different lengths, the smoothing reaches
+    /// DeltaMushDefinition::kMaxIterations. Where a vertex has edges of different lengths, the smoothing reaches
     /// farther along the longer ones. Parts narrower than the radius, such as fingers, are smoothed as a whole.
     float radius = 0.0f;
     /// 0 to 1.
@@ -161,7 +161,7 @@ struct DeltaMushSettings {
 };
 
 /// The stage `delta_mush` (Mancewicz et al. 2014), as Blender's Corrective Smooth with the rest source Original
-/// Coordinates; DeltaMushStage defines it. Takes any polygons, edges without faces, and edges of many faces.
+/// Coordinates; DeltaMushDefinition defines it. Takes any polygons, edges without faces, and edges of many faces.
 class SINEW_EXPORT DeltaMush {
 public:
     /// Throws also for sizes that exceed the limits, indices of vertices that do not exist, an edge of a face that is

@@ -1,26 +1,20 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
 // The stage `delta_mush` on whole chunks: see stages/delta_mush/delta_mush.h for the definition.
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include <algorithm>
 #include <cstdint>
 #include <cstring>
 #include <limits>
 
-#include "sinew/base/targets.h"
 #include "sinew/lanes/kernel.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 #include "sinew/stages/delta_mush/mush_mesh.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/stages/delta_mush/mush_kernel.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/stages/delta_mush/mush_kernel.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 constexpr float kRootOfTwo = 1.41421356237f;
 
@@ -202,7 +196,7 @@ HWY_INLINE void store_lanes(D d, const Points<D>& p, Float4* to, std::size_t lan
 /// 1 / length of a vector, from its square; 0 if the vector has no direction.
 template <class D>
 HWY_INLINE Vec<D> inverse_length(D d, Vec<D> squared) {
-    const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushStage::kShortest)));
+    const auto is_long = hn::Gt(squared, hn::Set(d, static_cast<float>(DeltaMushDefinition::kShortest)));
     return hn::IfThenElseZero(is_long, inverse_root(d, squared));
 }
 
@@ -244,7 +238,7 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     corner.unit_z = hn::Add(half_unit_z, half_unit_z);
     corner.unit_y = hn::Mul(half_unit_z, length_x);
 
-    // DeltaMushStage::angle() of the cosine c = a b. (a + b)^2 = 2 + 2 c and (a - b)^2 = 2 - 2 c, so the smaller
+    // DeltaMushDefinition::angle() of the cosine c = a b. (a + b)^2 = 2 + 2 c and (a - b)^2 = 2 - 2 c, so the smaller
     // is 2 (1 - |c|), and the polynomial's factor is the square root of half of it. If an edge has no direction,
     // c is 0.
     const auto least = hn::IfThenElse(are_two, hn::Min(squared_x, squared_y), hn::Set(d, 2.0f));
@@ -257,7 +251,7 @@ HWY_INLINE CornerLanes<D> corner_of(D d, const Points<D>& next, const Points<D>&
     const auto is_negative = hn::Lt(squared_x, squared_y);
     const auto angle = hn::IfThenElse(is_negative, hn::Sub(hn::Set(d, 3.14159265358979f), of_size), of_size);
     const auto largest = hn::Max(hn::Abs(corner.y.x), hn::Max(hn::Abs(corner.y.y), hn::Abs(corner.y.z)));
-    const auto is_bent = hn::Gt(largest, hn::Set(d, static_cast<float>(DeltaMushStage::kStraight)));
+    const auto is_bent = hn::Gt(largest, hn::Set(d, static_cast<float>(DeltaMushDefinition::kStraight)));
     corner.weight = hn::IfThenElseZero(is_bent, angle);
     return corner;
 }
@@ -398,7 +392,7 @@ HWY_INLINE void smooth_lanes_by_length(const MushFrame& frame, std::size_t valen
     if constexpr (kValence > 0) valence = kValence;
     const Full d;
     using D = Full;
-    const auto least = hn::Set(d, static_cast<float>(DeltaMushStage::kLeastLength));
+    const auto least = hn::Set(d, static_cast<float>(DeltaMushDefinition::kLeastLength));
     // There is room beyond the last vertex.
     alignas(64) float factors[kLanes];
     for (std::size_t lane = 0; lane < kLanes && !frame.is_uniform; ++lane) {
@@ -484,8 +478,7 @@ void smooth_by_length(const MushFrame& frame, std::size_t begin, std::size_t end
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "sinew/base/targets.h"
-#include "sinew/lanes/palette.h"
 #include "sinew/mesh/packed_mesh.h"
+#include "sinew/pose/palette.h"
 #include "sinew/stages/delta_mush/delta_mush.h"
 
 namespace sinew {

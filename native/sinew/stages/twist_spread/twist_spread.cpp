@@ -1,20 +1,15 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-// This file is compiled once for each instruction set by including itself (foreach_target.h).
 #include "sinew/stages/twist_spread/twist_spread.h"
 
 #include <algorithm>
 #include <cmath>
 #include <string>
 
-#include "sinew/base/targets.h"
 #include "sinew/stages/stage_state.h"
 #include "sinew/transform/split_scale.h"
 
-#undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "sinew/stages/twist_spread/twist_spread.cpp"
-#include "hwy/foreach_target.h"
-//
-#include "hwy/highway.h"
+#define SINEW_THIS_FILE "sinew/stages/twist_spread/twist_spread.cpp"
+#include "sinew/lanes/all_targets.h"
 #include "sinew/lanes/block_loop-inl.h"
 #include "sinew/lanes/exponential-inl.h"
 #include "sinew/lanes/gather-inl.h"
@@ -47,8 +42,8 @@ struct TwistedBone {
     float curve;
     float angle;   // half of it, radians
     float offset;  // radians, added to the angle times the share
-    float around;  // as in TwistSpreadStage::Bone
-    float part;    // as in TwistSpreadStage::Bone
+    float around;  // as in TwistSpreadDefinition::Bone
+    float part;    // as in TwistSpreadDefinition::Bone
 };
 
 /// What a twist has to do with the vertices of a block.
@@ -56,7 +51,7 @@ struct BlockTwist {
     Lanes<float> share{};     // 0 at the bone's head, 1 at its tail
     Lanes<float> arms[2]{};   // the vertex's distances from the line along the axes, times `weight`
     Lanes<float> weight{};    // of the bone
-    Lanes<float> below{};     // argument of TwistSpreadStage::missing_turns()
+    Lanes<float> below{};     // argument of TwistSpreadDefinition::missing_turns()
     std::size_t twist;        // into TwistFrame::twisted
     bool has_weight = false;  // else bones beyond the twist share vertices with others
 };
@@ -84,8 +79,7 @@ struct TwistFrame : StageFrame {
 #endif
 
 HWY_BEFORE_NAMESPACE();
-namespace sinew {
-namespace HWY_NAMESPACE {
+namespace sinew::HWY_NAMESPACE {
 
 /// Sine and 1 - cosine of an angle.
 template <class D>
@@ -133,7 +127,7 @@ HWY_INLINE Points<D> spun(D d, const TwistLine& line, const Turned<D>& rotation,
     return swept(d, line.axes, rotation, arm_of(d, line, 0, p), arm_of(d, line, 1, p));
 }
 
-/// TwistSpreadStage::missing_turns(), lane by lane: few frames need it.
+/// TwistSpreadDefinition::missing_turns(), lane by lane: few frames need it.
 template <class D>
 HWY_INLINE Vec<D> missing_turns(D d, TwistBlend blend, const TwistedBone& bone, Vec<D> below, Vec<D> mask) {
     alignas(64) float values[kLanes];
@@ -141,7 +135,7 @@ HWY_INLINE Vec<D> missing_turns(D d, TwistBlend blend, const TwistedBone& bone, 
     hn::Store(below, d, values);
     hn::Store(mask, d, masks);
     for (std::size_t i = 0; i < hn::Lanes(d); ++i) {
-        values[i] = TwistSpreadStage::missing_turns(blend, bone.around, values[i], masks[i] * bone.part);
+        values[i] = TwistSpreadDefinition::missing_turns(blend, bone.around, values[i], masks[i] * bone.part);
     }
     return hn::Load(d, values);
 }
@@ -155,7 +149,7 @@ struct Twisting {
     Vec<D> mix;
 };
 
-/// Twists by one bone: TwistSpreadStage::deform_vertex().
+/// Twists by one bone: TwistSpreadDefinition::deform_vertex().
 ///
 /// kLinear  whether all blends are linear
 /// rest_of  rest_of() returns the rest points, in the space of the bones
@@ -287,8 +281,7 @@ void measure(const TwistFrame& frame, std::span<const TwistRest> at_rest, std::s
     }
 }
 
-}  // namespace HWY_NAMESPACE
-}  // namespace sinew
+}  // namespace sinew::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
@@ -422,21 +415,23 @@ struct TwistSpread::State : BoneStage::State {
                 mix.empty() ? nullptr : mix.data()};
     }
 
-    [[nodiscard]] TwistSpreadStage::Reading<double> read(
-        std::size_t twist, const Pose& pose, std::span<const TwistChannels<float>> channels) const noexcept {
+    [[nodiscard]] TwistSpreadDefinition::Reading<double> read(
+        std::size_t twist, std::span<const Affine<float>> posed_from_rest,
+        std::span<const TwistChannels<float>> channels) const noexcept {
         const TwistBone& bones = twists[twist];
         const auto tip_rest = cast<double>(rest_bones[static_cast<std::size_t>(bones.tip)]);
         const Vec3<double>& axis = axes[twist].direction;
-        const Quat<double> rotation = rotation_between(motion(pose, bones.base).linear,
-                                                       motion(pose, bones.tip).linear, tip_rest.linear);
+        const Quat<double> rotation =
+            rotation_between(motion(posed_from_rest, bones.base).linear,
+                             motion(posed_from_rest, bones.tip).linear, tip_rest.linear);
         double expected = 0.0;
         if (!channels.empty() && channels[twist].rotation != Quat<float>(0.0f, Vec3<float>(0.0f))) {
             const TwistChannels<double> told{glm::normalize(Quat<double>(channels[twist].rotation)),
                                              Vec3<double>(channels[twist].angles)};
             const Quat<double> tip_axes = to_quat(rotation_keeping_y(tip_rest.linear));
-            expected = TwistSpreadStage::expected(told, rotation, tip_axes, axis);
+            expected = TwistSpreadDefinition::expected(told, rotation, tip_axes, axis);
         }
-        return TwistSpreadStage::read(rotation, axis, expected);
+        return TwistSpreadDefinition::read(rotation, axis, expected);
     }
 
     /// Lists blocks and block_twists.
@@ -475,7 +470,8 @@ struct TwistSpread::State : BoneStage::State {
     /// Fills `twisted`. Returns whether a bone is twisted.
     ///
     /// is_linear  as in TwistFrame: what other blends need is then left out
-    bool prepare(const Pose& pose, const TwistSpreadOptions& options, bool is_linear) const noexcept {
+    bool prepare(std::span<const Affine<float>> posed_from_rest, const TwistSpreadOptions& options,
+                 bool is_linear) const noexcept {
         bool any = false;
         const double amount = within(options.amount, 0.0f, 1.0f, 1.0f);
         for (std::size_t twist = 0; twist < twists.size(); ++twist) {
@@ -484,11 +480,11 @@ struct TwistSpread::State : BoneStage::State {
             const double factor =
                 options.amounts.empty() ? 1.0 : within(options.amounts[twist], 0.0f, 1.0f, 1.0f);
             if (amount * factor == 0.0) continue;
-            const auto [angle, around, part] = read(twist, pose, options.channels);
+            const auto [angle, around, part] = read(twist, posed_from_rest, options.channels);
             if (angle == 0.0) continue;
             any = bone.is_twisted = true;
             const TwistBone& listed = twists[twist];
-            const Affine<double> posed = motion(pose, listed.bone);
+            const Affine<double> posed = motion(posed_from_rest, listed.bone);
             const TwistLine& line = rest[twist].line;
             for (std::size_t k = 0; k < 2; ++k) {
                 const Vec3<double> image =
@@ -537,7 +533,7 @@ std::size_t TwistSpread::twist_count() const noexcept {
     return static_cast<const State&>(*state_).twists.size();
 }
 
-std::vector<float> TwistSpread::angles(const Pose& pose,
+std::vector<float> TwistSpread::angles(std::span<const Affine<float>> posed_from_rest,
                                        std::span<const TwistChannels<float>> channels) const {
     if (!channels.empty() && channels.size() != twist_count()) {
         fail("channels", "none, or those of " + std::to_string(twist_count()) + " bones",
@@ -545,13 +541,13 @@ std::vector<float> TwistSpread::angles(const Pose& pose,
     }
     std::vector<float> angles;
     for (std::size_t twist = 0; twist < twist_count(); ++twist) {
-        const double turns = static_cast<const State&>(*state_).read(twist, pose, channels).angle;
+        const double turns = static_cast<const State&>(*state_).read(twist, posed_from_rest, channels).angle;
         angles.push_back(static_cast<float>(2.0 * std::numbers::pi * turns));
     }
     return angles;
 }
 
-Status TwistSpread::apply(std::span<Vec3<float>> points, const Pose& pose,
+Status TwistSpread::apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                           const TwistSpreadOptions& options) const noexcept {
     const auto& state = static_cast<const State&>(*state_);
     const auto fits = [&](std::size_t size) { return size == 0 || size == state.twists.size(); };
@@ -564,13 +560,11 @@ Status TwistSpread::apply(std::span<Vec3<float>> points, const Pose& pose,
     frame.blend = options.blend;
     frame.mix_blend = state.mix.empty() ? options.blend : options.mix_blend;
     frame.is_linear = frame.blend == TwistBlend::linear && frame.mix_blend == TwistBlend::linear;
-    if (!state.prepare(pose, options, frame.is_linear)) return Status::ok;
-    const auto goes_short = [](TwistBlend blend) {
-        return blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
-    };
+    if (!state.prepare(posed_from_rest, options, frame.is_linear)) return Status::ok;
     const bool is_beyond = std::ranges::any_of(
         state.twisted, [](const auto& bone) { return bone.is_twisted && bone.around != 0.0f; });
-    frame.goes_around = is_beyond && (goes_short(frame.blend) || goes_short(frame.mix_blend));
+    frame.goes_around = is_beyond && (TwistSpreadDefinition::is_short(frame.blend) ||
+                                      TwistSpreadDefinition::is_short(frame.mix_blend));
     // Blends other than linear differ by the turns that they leave out alone.
     if (!frame.goes_around && frame.blend != TwistBlend::linear && frame.mix_blend != TwistBlend::linear)
         frame.mix_blend = frame.blend;

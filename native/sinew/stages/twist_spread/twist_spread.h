@@ -34,7 +34,7 @@ struct TwistChannels {
     Vec3<T> angles;    // radians about these axes: Euler angles, or angle times unit axis
 };
 
-/// How a method blends rotations that are more than 180 degrees apart. In the order of TwistSpreadStage::kBlends.
+/// How a method blends rotations that are more than 180 degrees apart. In the order of TwistSpreadDefinition::kBlends.
 enum class TwistBlend {
     linear,      // matrices: the stage twists the bone's own matrix
     matrices,    // a rotation made of blended matrices, which goes no way round
@@ -43,7 +43,7 @@ enum class TwistBlend {
 };
 
 /// Twist Spread: spreads the twist of a bone against the next along the bone, as twist bones do.
-struct TwistSpreadStage {
+struct TwistSpreadDefinition {
     static constexpr std::string_view kBlends[] = {"linear", "matrices", "rotations", "logarithms"};
     static constexpr Parameter kParameters[] = {
         {"enabled", "Twist Spread", "Spread twists along bones, as twist bones do", "",
@@ -140,6 +140,11 @@ struct TwistSpreadStage {
         return rotate(quat_from_axis_angle(axis, T(2) * std::numbers::pi_v<T> * turns), arm) - arm;
     }
 
+    /// Whether a method with this blend goes the shorter way round.
+    [[nodiscard]] static constexpr bool is_short(TwistBlend blend) noexcept {
+        return blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
+    }
+
     /// The turns that shortest-path blending drops where bones are `around` whole turns farther apart. There is nothing
     /// between one way round and the other: the greater part decides.
     ///
@@ -147,8 +152,7 @@ struct TwistSpreadStage {
     /// part   of the twist that is spread
     template <class T>
     [[nodiscard]] static T missing_turns(TwistBlend blend, T around, T below, T part) noexcept {
-        const bool is_short = blend == TwistBlend::rotations || blend == TwistBlend::logarithms;
-        if (!is_short || !(below > T(0)) || !(below < T(1)) || !(part > T(0.5))) return T(0);
+        if (!is_short(blend) || !(below > T(0)) || !(below < T(1)) || !(part > T(0.5))) return T(0);
         if (blend == TwistBlend::logarithms) return around * below;
         return around * T(2) * std::atan2(below, T(1) - below) / std::numbers::pi_v<T>;
     }
@@ -242,16 +246,16 @@ public:
     [[nodiscard]] std::size_t twist_count() const noexcept;
 
     /// The twist of each tip in a pose, radians [twists], with fades and turns, without amounts.
-    [[nodiscard]] std::vector<float> angles(const Pose& pose,
+    [[nodiscard]] std::vector<float> angles(std::span<const Affine<float>> posed_from_rest,
                                             std::span<const TwistChannels<float>> channels = {}) const;
 
     /// Spreads the twists in place.
     ///
-    /// points  [vertices] deformed, model space
-    /// pose    only its bones are read: the space is that of the rest points
+    /// points           [vertices] deformed, model space
+    /// posed_from_rest  [bones] finite
     ///
     /// Where no bone is twisted, no bit changes.
-    Status apply(std::span<Vec3<float>> points, const Pose& pose,
+    Status apply(std::span<Vec3<float>> points, std::span<const Affine<float>> posed_from_rest,
                  const TwistSpreadOptions& options = {}) const noexcept;
 
 private:

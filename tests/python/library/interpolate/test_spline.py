@@ -4,7 +4,6 @@ exact_interpolation.py has the oracles."""
 
 import numpy as np
 import pytest
-import sinew
 from motions import LAYOUT_OF, close, layout, matrix, rigid
 from scipy.spatial.transform import RigidTransform, Rotation
 from sinew.interpolate import METHODS, between
@@ -40,9 +39,3 @@ def test_signs_along_a_spline_go_from_key_to_key(method):
     # As each step is equal, the middle of the middle one is known.
     middle = catmull_rom(layout(motions[:4], name), steps[:4], 1.5, method).transforms
     close(matrix(middle, name)[:3, :3], Rotation.from_rotvec(turns[1].as_rotvec() * 1.5).as_matrix())
-
-
-def test_empty_skeleton_works():
-    skeleton = sinew.Skeleton(np.empty(0, np.int32))
-    assert skeleton.bone_count == 0
-    assert skeleton.root_relative(np.empty((0, 4, 4), np.float32)).shape == (0, 4, 4)

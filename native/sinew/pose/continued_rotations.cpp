@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/skeleton/continued_rotations.h"
+#include "sinew/pose/continued_rotations.h"
 
 #include <algorithm>
 #include <cmath>
+#include <string>
 
+#include "sinew/base/fail.h"
 #include "sinew/transform/split_scale.h"
 
 namespace sinew {
@@ -30,14 +32,19 @@ bool is_away(const Quat<double>& rotation, const Quat<double>& before, const Qua
 
 }  // namespace
 
-std::vector<Quat<float>> continued_rotations(const Skeleton& skeleton,
+std::vector<Quat<float>> continued_rotations(std::span<const std::int32_t> parents,
                                              std::span<const Affine<float>> posed_from_rest,
                                              std::span<const Quat<float>> turns) {
-    const std::size_t count = std::min(skeleton.bone_count(), posed_from_rest.size());
+    for (std::size_t bone = 0; bone < parents.size(); ++bone) {
+        if (parents[bone] >= -1 && parents[bone] < static_cast<std::int32_t>(bone)) continue;
+        fail("parents", "-1 or the index of an earlier bone",
+             std::to_string(parents[bone]) + " for bone " + std::to_string(bone));
+    }
+    const std::size_t count = std::min(parents.size(), posed_from_rest.size());
     std::vector<Quat<double>> rotations;
     std::vector<Quat<float>> result;
     for (std::size_t bone = 0; bone < count; ++bone) {
-        const std::int32_t parent = skeleton.parents()[bone];
+        const std::int32_t parent = parents[bone];
         const Quat<double> before =
             parent < 0 ? Quat<double>(1.0, Vec3<double>(0.0)) : rotations[static_cast<std::size_t>(parent)];
         const Mat3<double> linear(posed_from_rest[bone].linear);

@@ -9,7 +9,7 @@
 #include <span>
 
 #include "sinew/mesh/packed_mesh.h"
-#include "sinew/skeleton/pose.h"
+#include "sinew/pose/pose.h"
 #include "sinew/transform/scaled_rigid.h"
 
 namespace sinew {
@@ -40,34 +40,47 @@ inline constexpr float kMaxStretchSquared = 64.0f;
 /// Sizes are written in groups of this many; there is room for one less after the last bone.
 inline constexpr std::size_t kSizesAtOnce = 8;
 
+/// What a kernel keeps in a palette.
+struct RowLayout {
+    std::size_t float4s;       // in a row
+    bool are_of_sets = false;  // one for each bone of each set of bones, instead of one for each bone
+    bool have_scales = true;   // apart from them
+};
+
 /// A bone's motion in double.
-using PosedBone = ScaledRigid<QuatVec<double>, double>;
+using RigidBone = ScaledRigid<QuatVec<double>, double>;
 
 /// The bones of one frame in the form that a kernel reads, indexed as Frame::bones. A PaletteStore owns the
 /// memory.
 struct Palette {
-    Float4* bones = nullptr;  // Kernel::rest_row.size() for each row
+    Float4* bones = nullptr;  // RowLayout::float4s for each row
     // squared lengths of the translations, at least kMinSize squared; infinite beyond kMaxStretchSquared
     float* sizes = nullptr;
     // Whether a vertex whose first bone is this one may need an absolute sum.
     std::uint8_t* may_need_absolute_sum = nullptr;
-    Float4* scales = nullptr;           // kDisplacementRows for each bone, valid where it has scale
+    Float4* scales = nullptr;           // kDisplacementRows for each row, valid where its bone has scale
     std::uint8_t* has_scale = nullptr;  // not written if no bone has scale
-    std::int32_t* scaled = nullptr;     // indices of bones that are to be prepared one by one
-    PosedBone* posed = nullptr;         // each bone, for Kernel::set_rows
-    std::size_t scaled_count = 0;
+    std::int32_t* scaled = nullptr;     // scratch: indices of bones that are prepared one by one
+    RigidBone* rigid_bones = nullptr;   // scratch: each bone, for rows of sets
     bool any_scale = false;
     bool keeps_signs = false;  // whether rows are added with the signs that they have
 };
 
 /// The bones of a mesh in one pose.
 struct Bones {
-    std::span<const std::int32_t> used;  // their numbers in the pose
+    std::span<const std::int32_t> used;  // their numbers in the pose, ascending
+    std::size_t posed;                   // how many of `used` the pose has; the others stay at rest
     // indices into `used` of those whose rest axes do not have unit length
     std::span<const std::int32_t> stretched;
     std::span<const Affine<float>> rest_bones;  // one for each of `used`; empty: all identity
-    const BoneSets* sets;                       // empty unless a kernel has rows for sets
+    const BonePairs* pairs;
+    const BoneSets* sets;  // empty unless a kernel has rows of sets
     Pose pose;
+
+    /// Of an index into `used`, below `posed`.
+    [[nodiscard]] const Affine<float>& motion(std::size_t bone) const noexcept {
+        return pose.posed_from_rest[static_cast<std::size_t>(used[bone])];
+    }
 
     /// Orthonormal, for an index into `used`.
     [[nodiscard]] Affine<double> rest_bone(std::size_t bone) const noexcept {
@@ -85,6 +98,8 @@ template <class T>
 /// Writes the kDisplacementRows of a transform whose linear part minus the identity is `m`.
 void write_displacement(const Mat3<double>& m, const Vec3<double>& translation, Float4* rows) noexcept;
 void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
+/// Writes the Palette::scales of a bone: the displacement by `scale`, rotated.
+void write_rotated_scale(const Quat<double>& rotation, const Affine<double>& scale, Float4* rows) noexcept;
 
 /// The Palette::sizes of a bone with this translation and this squared difference of its linear part from the
 /// identity.
@@ -99,9 +114,14 @@ void write_displacement(const Affine<double>& a, Float4* rows) noexcept;
     return !(first < kMaxSizeRatio * kMaxSizeRatio * least);
 }
 
-/// Fills Palette::may_need_absolute_sum from the sizes, once per frame for each pair of bones, so that the test runs for
-/// few vertices.
-void find_absolute_sums(const BonePairs& pairs, std::size_t bones, Palette& palette) noexcept;
+/// Whether a bone with this rotation, by its index into Bones::used, has the other sign than Pose::rotations.
+[[nodiscard]] bool is_away(const Bones& bones, std::size_t bone, const Quat<double>& rotation) noexcept;
+
+/// Gives rows the signs of Pose::rotations.
+///
+/// row_float4s, signed_float4s  in a row: how many there are, and how many change sign with the rotation
+void take_signs(const Bones& bones, std::size_t row_float4s, std::size_t signed_float4s,
+                const Palette& palette) noexcept;
 
 [[nodiscard]] bool is_identity(const Affine<float>& a) noexcept;
 

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: GPL-3.0-or-later
-#include "sinew/lanes/palette_store.h"
+#include "sinew/pose/palette_store.h"
 
-#include <algorithm>
 #include <bit>
 #include <memory>
 #include <new>
@@ -16,19 +15,20 @@ static_assert(alignof(Float4) <= __STDCPP_DEFAULT_NEW_ALIGNMENT__);
 /// One thread's palettes.
 struct PaletteStore::Palettes {
     explicit Palettes(const PaletteStore& store) {
-        for (std::size_t k = 0; k < store.kernels_.size() && store.kernels_[k] != nullptr; ++k)
-            add(*store.kernels_[k], store.bones_, store.entries_, k);
+        for (std::size_t k = 0; k < store.count_; ++k) {
+            add(store.layouts_[k], store.bones_, store.entries_, k);
+        }
     }
 
-    void add(const Kernel& kernel, std::size_t bones, std::size_t entries, std::size_t k) {
-        const std::size_t rows = kernel.row_count(bones, entries);
-        const std::size_t scaled_rows = kernel.keeps_scale() ? rows : 0;
+    void add(const RowLayout& layout, std::size_t bones, std::size_t entries, std::size_t k) {
+        const std::size_t rows = layout.are_of_sets ? entries : bones;
+        const std::size_t scaled_rows = layout.have_scales ? rows : 0;
         // A bone may be listed twice as scaled: because of its rest axes, and because of its pose.
-        const std::size_t scaled_bones = kernel.keeps_scale() ? 2 * bones : 0;
-        const std::size_t posed_bones = kernel.set_rows != nullptr ? bones : 0;
-        std::array<std::size_t, 7> sizes{kernel.rest_row.size() * rows * sizeof(Float4),
+        const std::size_t scaled_bones = layout.have_scales ? 2 * bones : 0;
+        const std::size_t rigid_bones = layout.are_of_sets ? bones : 0;
+        std::array<std::size_t, 7> sizes{layout.float4s * rows * sizeof(Float4),
                                          kDisplacementRows * scaled_rows * sizeof(Float4),
-                                         posed_bones * sizeof(PosedBone),
+                                         rigid_bones * sizeof(RigidBone),
                                          (rows + kSizesAtOnce) * sizeof(float),
                                          scaled_bones * sizeof(std::int32_t),
                                          rows,
@@ -42,7 +42,7 @@ struct PaletteStore::Palettes {
         Palette& palette = of_kernels[k];
         palette.bones = reinterpret_cast<Float4*>(next());
         palette.scales = reinterpret_cast<Float4*>(next());
-        palette.posed = reinterpret_cast<PosedBone*>(next());
+        palette.rigid_bones = reinterpret_cast<RigidBone*>(next());
         palette.sizes = reinterpret_cast<float*>(next());
         palette.scaled = reinterpret_cast<std::int32_t*>(next());
         palette.may_need_absolute_sum = reinterpret_cast<std::uint8_t*>(next());
@@ -53,9 +53,9 @@ struct PaletteStore::Palettes {
     std::array<std::unique_ptr<std::byte[]>, kMaxKernels> memory;
 };
 
-PaletteStore::PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries)
-    : bones_(bones), entries_(entries) {
-    std::ranges::copy(kernels, kernels_.begin());
+PaletteStore::PaletteStore(const std::array<RowLayout, kMaxKernels>& layouts, std::size_t count,
+                           std::size_t bones, std::size_t entries)
+    : layouts_(layouts), count_(count), bones_(bones), entries_(entries) {
     palettes_[0] = new Palettes(*this);
 }
 

@@ -5,10 +5,9 @@
 #include <atomic>
 #include <cstddef>
 #include <cstdint>
-#include <span>
 
 #include "sinew/base/fork_safe.h"
-#include "sinew/lanes/kernel.h"
+#include "sinew/pose/palette.h"
 
 namespace sinew {
 
@@ -23,10 +22,11 @@ public:
     static constexpr std::uint32_t kMax = 16;
     static constexpr std::size_t kMaxKernels = 2;
 
-    /// kernels  one or two, all used by each thread
+    /// layouts  of `count` kernels, all used by each thread
     /// bones    number of bones that the mesh uses
     /// entries  number of entries in its BoneSets; 0 if no kernel needs sets
-    PaletteStore(std::span<const Kernel* const> kernels, std::size_t bones, std::size_t entries);
+    PaletteStore(const std::array<RowLayout, kMaxKernels>& layouts, std::size_t count, std::size_t bones,
+                 std::size_t entries);
     ~PaletteStore();
     PaletteStore(const PaletteStore&) = delete;
     PaletteStore& operator=(const PaletteStore&) = delete;
@@ -68,7 +68,8 @@ private:
     /// Makes the palettes of the thread that has this bit. Returns false without memory.
     bool make(std::uint32_t index) noexcept;
 
-    std::array<const Kernel*, kMaxKernels> kernels_{};
+    std::array<RowLayout, kMaxKernels> layouts_;
+    std::size_t count_;
     std::size_t bones_;
     std::size_t entries_;
     std::array<std::atomic<Palettes*>, kMax> palettes_{};
