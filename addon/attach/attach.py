@@ -338,7 +338,8 @@ def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
     """Takes over that the artist switched Sinew's modifier on where a small mesh is left to Blender. Returns
     whether it was."""
     settings, is_switched = properties.of(obj), False
-    if settings.replaces_modifiers or not now.sinew or obj.mode in ("EDIT", "SCULPT"):
+    is_left = settings.enabled and not settings.replaces_modifiers and obj.library is None
+    if not (is_left and now.sinew) or obj.mode in ("EDIT", "SCULPT"):
         return False
     nodes = now.by_name[now.sinew]
     for name, is_shown, is_keyed in zip(VIEWS, nodes.shown, nodes.keyed, strict=True):

@@ -36,17 +36,14 @@ def first_facts(obj: bpy.types.Object, now: Layout, error: str) -> ObjectFacts:
     now    its layout
     error  why Sinew can not deform it; empty where it can
     """
-    settings, is_linked = properties.of(obj), obj.library is not None
     if attach.is_off(obj):
         return ObjectFacts(enabled=False)
-    if not is_linked and attach.follow_own_icons(obj, now):
-        now = layout.read(obj)
     viewport, render = now.icons
     is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
     return ObjectFacts(
-        enabled=settings.enabled,
+        enabled=properties.of(obj).enabled,
         error=error,
-        is_linked=is_linked,
+        is_linked=obj.library is not None,
         mode=mode_of(obj),
         has_upstream=upstream_proxy.is_needed(obj, now),
         visibility_is_keyed=now.is_visibility_keyed,
@@ -66,13 +63,10 @@ def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) 
     waits_for  what its method needs and is not computed yet
     """
     settings, mesh = properties.of(obj), obj.data
-    gives_normals = normals.are_given(settings)
-    domain = normals.domain_of(mesh) if gives_normals else ""
-    obstacle = normals.obstacle(obj, now) if domain else ""
-    given = normals.kind_of(mesh, "" if obstacle else domain)
+    given, reason = normals.given(obj, now)
     return replace(
         first_facts(obj, now, error=""),
-        builtin_is_faster=small_meshes.is_builtin_faster(obj, now, given),
+        builtin_is_faster=small_meshes.is_builtin_faster(obj, now, normals.kind_of(mesh, given.domain)),
         upstream_changes_weights=upstream_proxy.changes_weights(now),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
         mesh_is_editable=mesh.is_editable,
@@ -81,11 +75,8 @@ def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) 
         safe_mode=safe_mode.is_on(),
         failure=failure,
         waits_for=waits_for,
-        gives_normals=gives_normals,
-        skins_normals=settings.normals == properties.SKINNED_NORMALS,
-        normals_domain=domain,
-        normals_obstacle=obstacle,
-        normals_for_viewport_alone=bool(domain) and normals.is_for_viewport_alone(now),
+        normals=given,
+        normals_reason=reason,
     )
 
 

@@ -20,12 +20,12 @@ from ..io.actions import animated_paths
 from ..skinning import sdef
 from ..skinning.arrays import are_equal
 from ..skinning.rig import Bones, RigFacts, Weighting
+from ..skinning.shading import GivenNormals
 from ..skinning.skin_stack import ModifierSkin, SkinDeformer, SkinStack
 from ..skinning.stage_mesh import StageMesh
 from ..skinning.stages import StagesAfter
 from ..skinning.vertex_data import VertexData
 from . import source, survey
-from .plan import Normals
 from .source import Source
 
 
@@ -77,7 +77,7 @@ class Bound:
         ]
 
     def write_normals(
-        self, points: np.ndarray, rest_points: np.ndarray, given: Normals, out: np.ndarray
+        self, points: np.ndarray, rest_points: np.ndarray, given: GivenNormals, out: np.ndarray
     ) -> None:
         """Computes the normals that belong to the points.
 

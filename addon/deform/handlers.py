@@ -95,9 +95,9 @@ def _begin_evaluation() -> None:
     is_renamed = False
     for obj, state in current.pairs:
         evaluation = state.evaluation
-        evaluation.mesh, evaluation.is_event_known, evaluation.was_tagged = 0, True, False
+        evaluation.given, evaluation.is_event_known, evaluation.was_tagged = set(), True, False
         try:
-            evaluation.is_only_user = state.noted.mesh_users == obj.data.users
+            evaluation.is_only_user = state.noted.own.mesh_users == obj.data.users
             is_renamed |= state.noted.name != obj.name
         except ReferenceError:
             # The object was deleted since the list was made.

@@ -21,7 +21,7 @@ from ..io import mesh_io
 from ..io.actions import animated_paths
 from . import pose, source
 from .plan import State
-from .skinned_object import Shown, SkinnedObject
+from .skinned_object import LeftOut, Shown, SkinnedObject
 
 # How many evaluated copies of an object are remembered.
 _MAX_COPIES = 32
@@ -64,7 +64,8 @@ class DepsgraphRequests:
             deform(evaluated, evaluated_mesh, skinned)
         except Exception as error:
             # The handlers deal with it, and the panel shows it.
-            skinned.evaluation.fail(error)
+            skinned.evaluation.given.discard(evaluated_mesh.as_pointer())
+            skinned.fail(error)
 
 
 def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> None:
@@ -77,7 +78,8 @@ def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedOb
     with skinned.lock:
         reason = _deform(evaluated, mesh, skinned)
         if reason:
-            skinned.evaluation.skip_reason, skinned.evaluation.mesh = reason, 0
+            skinned.evaluation.skip_reason = reason
+            skinned.evaluation.given.discard(mesh.as_pointer())
 
 
 def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> str:
@@ -104,7 +106,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mesh changed"
     evaluation = skinned.evaluation
     icons = pose.icons_of(evaluated, modifiers, skinned)
-    is_for_viewports = evaluation.mesh_shown == mesh.as_pointer()
+    is_for_viewports = skinned.viewport_mesh == mesh.as_pointer()
     _leave_out(evaluated, modifiers if is_for_viewports and skinned.plan.leaves_out else [], skinned, icons)
     out, normals = memory
     _note_unannounced_change(out, skinned)
@@ -118,7 +120,8 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         bound.write_normals(out, rest_points, skinned.plan.normals, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
-    evaluation.mesh, evaluation.skip_reason, evaluation.failures_in_a_row = mesh.as_pointer(), "", 0
+    evaluation.given.add(mesh.as_pointer())
+    evaluation.skip_reason, skinned.failures.in_a_row = "", 0
     number, taken = skinned.shown.number + 1, 1000.0 * (time.perf_counter() - started)
     skinned.shown = Shown(frames, rest_points, values, out[0].tobytes(), number, taken)
     # An animation can choose a method whose data has not been requested yet.
@@ -137,19 +140,18 @@ def _leave_out(
     """
     stack_now, known = evaluated.modifiers, skinned.noted.layout
     left_out = {replaced.name for replaced, _armature in modifiers}
-    copy = evaluated.as_pointer()
-    # Of a copy that is marked, the address is known.
-    if stack_now[known.sinew].show_in_editmode and skinned.evaluation.left_out.get(copy) == left_out:
+    copy, is_marked = evaluated.as_pointer(), stack_now[known.sinew].show_in_editmode
+    if is_marked and copy in skinned.left_out and skinned.left_out[copy].modifiers == left_out:
         return
     names = map(bpy.utils.escape_identifier, (*known.own, *known.replaced))
     starts = tuple(f'modifiers["{name}"].show_' for name in names)
     if any(path.startswith(starts) for path in animated_paths(evaluated)):
         # An animation that was just added decides from now on.
         return
-    if len(skinned.evaluation.left_out) > _MAX_COPIES:
+    if len(skinned.left_out) > _MAX_COPIES:
         # Each frame of a render can have made one.
-        skinned.evaluation.left_out.clear()
-    skinned.evaluation.left_out[copy] = left_out
+        skinned.left_out.clear()
+    skinned.left_out[copy] = LeftOut(left_out, icons)
     for view, of_view in zip(VIEWS, icons, strict=True):
         is_by_sinew = of_view.deformer is Deformer.SINEW
         shown = [

@@ -227,7 +227,7 @@ def on_render_end(_may_react: bool) -> None:
 def _after_render() -> float | None:
     if is_rendering_in_window():
         return 0.05
-    must_refresh = phase.must_refresh or any(state.needs_apply for state in session.current.skinned.values())
+    must_refresh = phase.must_refresh or any(state.needs_plan for state in session.current.skinned.values())
     phase.must_refresh = False
     if must_refresh:
         session.refresh_between_steps(bpy.context)

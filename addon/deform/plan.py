@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from ..attach.icons import Deformer
+from ..skinning.shading import GivenNormals
 
 # In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
 ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
@@ -28,20 +29,6 @@ class State(Enum):
 
 # Nothing of the object is read then.
 _UNREAD = (State.OFF, State.REFUSED, State.LINKED, State.EDITING)
-
-
-@dataclass(frozen=True)
-class Normals:
-    """The normals that Sinew gives along with the points.
-
-    domain                  POINT or CORNER: the elements that have normals; empty where Blender computes them
-    are_skinned             skinned from the rest normals, not computed from the deformed surface
-    are_for_viewport_alone  in renders Blender computes them
-    """
-
-    domain: str = ""
-    are_skinned: bool = False
-    are_for_viewport_alone: bool = False
 
 
 _IN_BOTH = {
@@ -78,7 +65,7 @@ class Plan:
     reason: str = ""
     in_buffer: bool = False
     after_update: bool = False
-    normals: Normals = Normals()
+    normals: GivenNormals = GivenNormals()
     normals_reason: str = ""
     leaves_out: bool = True
     viewport: Deformer = Deformer.SINEW
@@ -147,12 +134,7 @@ class ObjectFacts:
     safe_mode                   nothing of Sinew may run within Blender's evaluation
     failure                     the error within Blender's evaluation; empty if there was none
     waits_for                   what its method needs and is not computed yet, as a clause; empty if nothing
-    gives_normals               the user chose that Sinew computes normals
-    skins_normals               the user chose that normals are skinned
-    normals_domain              POINT or CORNER: the normals that draw the mesh; empty where Blender always
-                                computes them
-    normals_obstacle            why Blender has to compute the normals, as a clause; empty where it need not
-    normals_for_viewport_alone  a modifier that is on only in renders needs Blender's normals
+    normals, normals_reason     those of the plan
     """
 
     enabled: bool = True
@@ -175,11 +157,8 @@ class ObjectFacts:
     safe_mode: bool = False
     failure: str = ""
     waits_for: str = ""
-    gives_normals: bool = False
-    skins_normals: bool = False
-    normals_domain: str = ""
-    normals_obstacle: str = ""
-    normals_for_viewport_alone: bool = False
+    normals: GivenNormals = GivenNormals()
+    normals_reason: str = ""
 
 
 def plan(facts: ObjectFacts) -> Plan:
@@ -205,33 +184,12 @@ def _plan(facts: ObjectFacts) -> Plan:
     reason = _why_not_in_depsgraph(facts)
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
-    normals, normals_reason = _normals(facts)
     # The route does not change while it waits: afterwards only the method changes.
     state = State.AFTER_UPDATE if reason else State.IN_DEPSGRAPH
     if facts.waits_for:
         state = State.WAITING
-    return Plan(
-        state,
-        facts.waits_for or reason,
-        in_buffer,
-        bool(reason),
-        normals=normals,
-        normals_reason=normals_reason,
-    )
-
-
-def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
-    """Returns Plan.normals and Plan.normals_reason."""
-    if not (facts.gives_normals and facts.normals_domain):
-        return Normals(), ""
-    reasons = (
-        (bool(facts.normals_obstacle), facts.normals_obstacle),
-        (facts.has_heat_map, "its heat map is shown"),
-    )
-    obstacle = next((reason for holds, reason in reasons if holds), "")
-    if obstacle:
-        return Normals(), obstacle
-    return Normals(facts.normals_domain, facts.skins_normals, facts.normals_for_viewport_alone), ""
+    given = facts.normals, facts.normals_reason
+    return Plan(state, facts.waits_for or reason, in_buffer, bool(reason), *given)
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

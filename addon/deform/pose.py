@@ -160,15 +160,16 @@ def icons_of(
 ) -> tuple[Icons, Icons]:
     """Returns the icons in the viewport and in renders, as the artist or an animation set them."""
     own = evaluated.modifiers[skinned.noted.layout.sinew]
-    # Otherwise in_depsgraph.py has switched them since Blender copied them.
-    if not own.show_in_editmode or skinned.evaluation.icons is None:
-        replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
-        viewport, render = (
-            Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced))
-            for icon in ("show_viewport", "show_render")
-        )
-        skinned.evaluation.icons = viewport, render
-    return skinned.evaluation.icons
+    if own.show_in_editmode:
+        # in_depsgraph.py has switched them since Blender copied them.
+        left_out = skinned.left_out.get(evaluated.as_pointer())
+        return skinned.noted.layout.icons if left_out is None else left_out.icons
+    replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
+    viewport, render = (
+        Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced))
+        for icon in ("show_viewport", "show_render")
+    )
+    return viewport, render
 
 
 def _taking_part(icons: tuple[Icons, Icons], mode: str) -> tuple[bool, ...]:

@@ -36,7 +36,7 @@ def check() -> float | None:
         try:
             # A render may have computed it meanwhile.
             if precomputing.take_results(obj, skinned) or skinned.has_new_data:
-                has_ended = skinned.needs_apply = True
+                has_ended = skinned.needs_plan = True
             is_outdated |= _see_to_outdated(obj, skinned)
         except ReferenceError:
             # The object was deleted since the list was made.
@@ -84,6 +84,6 @@ def finish(context: bpy.types.Context) -> None:
 
 def _refresh() -> None:
     for _obj, skinned in current.pairs:
-        skinned.needs_apply = True
+        skinned.needs_plan = True
     session.refresh(bpy.context)
     begin()

@@ -207,7 +207,7 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
             return
         current.objects = None
         for uid, state in current.skinned.items():
-            state.needs_apply |= changed is None or uid == changed.session_uid
+            state.needs_plan |= changed is None or uid == changed.session_uid
     # Handlers react to this evaluation by themselves, in time for what others' later handlers change. What
     # these change of objects that are deformed after the update is only there at its end.
     depsgraph = context.evaluated_depsgraph_get()
@@ -525,7 +525,7 @@ def _note_readers(changes: Changes) -> None:
     with contextlib.suppress(ReferenceError):
         if any(normals.may_read_meshes(obj) for obj in changes.edited):
             for state in current.skinned.values():
-                state.needs_apply |= bool(state.plan.normals.domain or state.plan.normals_reason)
+                state.needs_plan |= bool(state.plan.normals.domain or state.plan.normals_reason)
 
 
 def expect_mesh_update(obj: bpy.types.Object) -> None:

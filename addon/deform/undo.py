@@ -44,7 +44,7 @@ def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.
     return (
         plan.state is State.IN_DEPSGRAPH
         and not (plan.in_buffer or state.bound.source.from_upstream)
-        and not (state.needs_recheck or state.needs_apply)
+        and not (state.needs_recheck or state.needs_plan)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
         and obj.mode == state.noted.layout.mode == "OBJECT"
         and _is_shown(obj, depsgraph)

@@ -87,12 +87,12 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
     if state is None:
         return found
     found += state.bound.lacks((settings.method, settings.mix.method))
-    if state.evaluation.failures:
+    if state.failures.count:
         found.append(
             tr(
                 "{count} times not deformed within Blender's evaluation; last: {failure}",
-                count=state.evaluation.failures,
-                failure=tr(state.evaluation.failure),
+                count=state.failures.count,
+                failure=tr(state.failures.last),
             )
         )
     found += state.bound.facts.warnings

@@ -41,7 +41,7 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
     if state is None or state.shown.frames is None:
         raise NotBySinewError("Sinew has not deformed it")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    modifiers, is_within = obj.evaluated_get(depsgraph).modifiers, bool(state.evaluation.mesh)
+    modifiers, is_within = obj.evaluated_get(depsgraph).modifiers, bool(state.evaluation.given)
     if not modifiers[stack.sinew_modifier(obj).name].show_viewport:
         raise NotBySinewError("its modifier is off")
     for modifier in modifiers:

@@ -201,6 +201,7 @@ OBSTACLES = {
     "shrinkwrap of a bone": (add_shrinkwrap_of_bone, "another object"),
     "hair": (add_hair, "another object"),
     "instances": (lambda obj: setattr(obj, "instance_type", "FACES"), "instances"),
+    "heat map": (lambda obj: setattr(obj.sinew, "heat", True), "its heat map is shown"),
 }
 
 

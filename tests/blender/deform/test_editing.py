@@ -430,8 +430,8 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
     monkeypatch.setattr(in_depsgraph, "_deform", fail)
     got = scenes.shapes(obj, [2, 3, 4, 5])
     state = session.state_of(obj)
-    assert state.evaluation.failures > 0
-    assert "disk on fire" in state.evaluation.failure
+    assert state.failures.count > 0
+    assert "disk on fire" in state.failures.last
     assert state.plan.state is State.AFTER_UPDATE
     assert "disk on fire" in state.plan.reason
     monkeypatch.undo()
@@ -487,4 +487,4 @@ def test_a_renamed_modifier_is_no_failure(name, route):
     obj.modifiers[name].name = "Another"
     bpy.context.view_layer.update()
     assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
-    assert session.state_of(obj).evaluation.failures == 0
+    assert session.state_of(obj).failures.count == 0

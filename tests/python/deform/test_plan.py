@@ -8,6 +8,7 @@ from dataclasses import fields
 import pytest
 from sinew_addon.attach.icons import Deformer, Icons
 from sinew_addon.deform.plan import ObjectFacts, State, plan
+from sinew_addon.skinning.shading import GivenNormals
 
 _HIDDEN = {"viewport": Deformer.NOTHING, "render": Deformer.NOTHING}
 TABLE = [
@@ -87,34 +88,12 @@ def test_who_waits_keeps_its_route(route):
     assert not waiting.uses_builtin
 
 
-SMOOTH = {"gives_normals": True, "normals_domain": "POINT"}
-NORMALS = [
-    ({}, "", ""),
-    (SMOOTH, "POINT", ""),
-    ({**SMOOTH, "normals_domain": "CORNER"}, "CORNER", ""),
-    ({**SMOOTH, "normals_domain": ""}, "", ""),
-    ({**SMOOTH, "gives_normals": False}, "", ""),
-    ({**SMOOTH, "normals_obstacle": "Cast follows"}, "", "Cast follows"),
-    ({**SMOOTH, "has_upstream": True}, "POINT", ""),
-    ({**SMOOTH, "normals_for_viewport_alone": True}, "POINT", ""),
-    ({**SMOOTH, "has_heat_map": True}, "", "heat map"),
-    ({**SMOOTH, "safe_mode": True}, "POINT", ""),
-    ({**SMOOTH, "mesh_is_shared": True}, "POINT", ""),
-    ({**SMOOTH, "waits_for": "until found"}, "POINT", ""),
-    ({**SMOOTH, "skins_normals": True}, "POINT", ""),
-    ({**SMOOTH, "mode": "EDIT"}, "", ""),
-    ({**SMOOTH, "enabled": False}, "", ""),
-]
-
-
-@pytest.mark.parametrize(("facts", "domain", "reason"), NORMALS)
-def test_who_computes_normals(facts, domain, reason):
-    found = plan(ObjectFacts(**facts))
-    assert found.normals.domain == domain
-    assert found.normals.are_skinned == facts.get("skins_normals", False)
-    assert found.normals.are_for_viewport_alone == facts.get("normals_for_viewport_alone", False)
-    assert reason in found.normals_reason
-    assert bool(found.normals_reason) == bool(reason)
+@pytest.mark.parametrize("facts", [facts for facts, *_ in TABLE])
+def test_normals_are_given_by_who_deforms(facts):
+    given = {"normals": GivenNormals("POINT", are_skinned=True), "normals_reason": "Cast follows"}
+    found = plan(ObjectFacts(**facts, **given))
+    is_given = found.state in (State.WAITING, State.IN_DEPSGRAPH, State.AFTER_UPDATE)
+    assert (found.normals == given["normals"]) == bool(found.normals_reason) == is_given
 
 
 @pytest.mark.parametrize(
@@ -146,5 +125,5 @@ def test_the_panel_says_what_deforms_in_each_view(viewport, render):
 
 def test_every_fact_matters():
     """A fact that no row changes would not need to be collected."""
-    named = {name for facts, *_ in (*TABLE, *NORMALS) for name in facts}
+    named = {name for facts, *_ in TABLE for name in facts} | {"normals", "normals_reason"}
     assert named == {field.name for field in fields(ObjectFacts)}
