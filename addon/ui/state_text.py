@@ -82,7 +82,7 @@ def icon_of(obj: bpy.types.Object) -> str:
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
     """Returns what the artist should fix, apart from what prevents Sinew."""
-    settings, state, failed = properties.of(obj), session.state_of(obj), lifecycle.failure_of_saving(obj)
+    settings, state, failed = properties.of(obj), session.skinned_of(obj), lifecycle.failure_of_saving(obj)
     found = [failed] if failed else []
     if state is None:
         return found

@@ -35,7 +35,7 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
 
     Raises NotBySinewError if the shape is not Sinew's.
     """
-    settings, state = properties.of(obj), session.state_of(obj)
+    settings, state = properties.of(obj), session.skinned_of(obj)
     if not settings.enabled:
         raise NotBySinewError(f"Sinew is off: {settings.error}")
     if state is None or state.shown.frames is None:

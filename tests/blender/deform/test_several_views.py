@@ -101,7 +101,7 @@ def test_undo_with_a_view_layer_that_is_not_shown(route):
         bpy.context.view_layer.update()
         handlers.check_unannounced()
         obj = bpy.data.objects["Arm"]
-        shown, plan = scenes.final_points(obj), session.state_of(obj).plan
+        shown, plan = scenes.final_points(obj), session.skinned_of(obj).plan
         assert (scene.frame_current, obj.modifiers["Front"].levels) == (4, 1), "nothing is tested"
         scenes.assert_as_without(obj, shown)
         assert plan.is_in_depsgraph == (route == routes.EVALUATION), plan.reason

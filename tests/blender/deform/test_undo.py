@@ -164,17 +164,17 @@ def test_what_a_step_leaves_alone_is_not_read_again(route, edit, tmp_path):
         EDITS[each](bpy.data.objects["Arm"])
         bpy.context.view_layer.update()
         bpy.ops.ed.undo_push(message=each)
-    known = session.state_of(bpy.data.objects["Other"])
+    known = session.skinned_of(bpy.data.objects["Other"])
     bound = known.bound
     # Also a second time: reactions to undo are part of the next step.
     for _time in range(2):
         number = known.shown.number
         bpy.ops.ed.undo()
         other = bpy.data.objects["Other"]
-        assert session.state_of(other) is known
+        assert session.skinned_of(other) is known
         assert known.bound is bound
         # Blender itself evaluates objects with an armature once after each step.
         assert known.shown.number <= number + 1
-        assert session.state_of(bpy.data.objects["Arm"]) is not None
+        assert session.skinned_of(bpy.data.objects["Arm"]) is not None
         bpy.ops.ed.redo()
         bpy.context.view_layer.update()

@@ -80,12 +80,12 @@ def test_in_a_window_the_old_radius_stays_until_the_new_is_computed(in_window):
     bpy.context.scene.frame_set(FRAME)
     scenes.add_sinew(obj, "ddm")
     look_until_done()
-    assert session.state_of(obj).plan.state is not State.WAITING
+    assert session.skinned_of(obj).plan.state is not State.WAITING
     assert_equal_to_reference(obj, 0.05)
     before = scenes.final_points(obj)
     properties.of(obj).ddm.radius = 0.3
     bpy.context.view_layer.update()
-    assert session.state_of(obj).plan.state is not State.WAITING
+    assert session.skinned_of(obj).plan.state is not State.WAITING
     assert scenes.worst(scenes.final_points(obj), before) < 1e-6
     look_until_done()
     assert_equal_to_reference(obj, 0.3)

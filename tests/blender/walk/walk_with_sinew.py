@@ -217,7 +217,7 @@ class SinewSide(Side):
 
     def compute_beside(self, on: bool) -> None:
         """Precomputations run on a thread, as in a window, or before the first frame."""
-        precomputations.waits = not on
+        precomputations.blocks = not on
 
     def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
         return [

@@ -28,7 +28,7 @@ def hero() -> bpy.types.Object:
 
 
 def plan() -> str:
-    state = sinew("deform.session").state_of(hero())
+    state = sinew("deform.session").skinned_of(hero())
     return "none" if state is None else state.plan.state.value
 
 
@@ -125,7 +125,7 @@ def stop_and_go_on() -> Iterator[None]:
     yield from window.until(lambda: not sinew("skinning.precompute").precomputations.running, "its end")
     yield from window.wait()
     facts["plan_stopped"] = plan()
-    facts["reason_stopped"] = sinew("deform.session").state_of(hero()).plan.reason
+    facts["reason_stopped"] = sinew("deform.session").skinned_of(hero()).plan.reason
     with window.in_view3d():
         bpy.ops.sinew.precompute("INVOKE_DEFAULT")
     yield from window.until(lambda: plan() == "in depsgraph", "its shape", PATIENCE)
