@@ -32,6 +32,7 @@ from . import (
 )
 from .icons import VIEWS, Deformer
 from .layout import Layout, method_of
+from .property_groups import assign
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -301,7 +302,7 @@ def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
         pose_driver.remove(obj)
     if nodes is not None:
         # In edit mode the Armature modifiers deform.
-        _set_icon(nodes, "show_in_editmode", False)
+        assign(nodes, "show_in_editmode", False)
     for view in range(len(VIEWS)):
         _switch_own(obj, now, view, on, was_on, in_depsgraph)
     undeformed.mark(obj, on)
@@ -322,7 +323,7 @@ def _switch_own(
             is_clicked |= getattr(known, icon) != getattr(nodes, icon)
             property_groups.store(known, icon, getattr(nodes, icon))
         is_shown = on and getattr(known, icon)
-        _set_icon(nodes, icon, is_shown)
+        assign(nodes, icon, is_shown)
     # Within the evaluation, in_depsgraph.py switches them: a click evaluates the object once.
     is_clicked |= not is_shown
     undeformed.switch(obj, now, icon, on if in_depsgraph else is_shown, is_clicked)
@@ -356,10 +357,10 @@ def show(obj: bpy.types.Object) -> None:
     for view, name in enumerate(VIEWS):
         property_groups.store(settings.stack, f"show_{name}", True)
         if settings.replaces_modifiers and now.sinew and not now.by_name[now.sinew].keyed[view]:
-            _set_icon(obj.modifiers[now.sinew], f"show_{name}", True)
+            assign(obj.modifiers[now.sinew], f"show_{name}", True)
         if now.icons[view].deformer is Deformer.NOTHING:
             for skin in now.skins:
-                _set_icon(obj.modifiers[skin.name], f"show_{name}", True)
+                assign(obj.modifiers[skin.name], f"show_{name}", True)
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
@@ -384,7 +385,7 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
             wanted = own
         property_groups.store(replaced, "preserve_volume", own)
         property_groups.store(replaced, "was_nearest", own == wanted)
-        _preserve_volume(modifier, wanted)
+        assign(modifier, "use_deform_preserve_volume", wanted)
     property_groups.store(settings.before, "has_nearest_volume", True)
 
 
@@ -398,7 +399,7 @@ def restore_volume(obj: bpy.types.Object) -> bool:
         modifier = stack.modifier_of(obj, replaced)
         # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
-            _preserve_volume(modifier, replaced.preserve_volume)
+            assign(modifier, "use_deform_preserve_volume", replaced.preserve_volume)
     property_groups.store(settings.before, "has_nearest_volume", False)
     return True
 
@@ -410,20 +411,9 @@ def has_switched_volume(obj: bpy.types.Object) -> bool:
     return settings.before.has_nearest_volume and not are_nearest
 
 
-def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> None:
-    if modifier.use_deform_preserve_volume != preserve:
-        modifier.use_deform_preserve_volume = preserve
-
-
 def _show(modifier: bpy.types.Modifier, viewport: bool, render: bool) -> None:
-    _set_icon(modifier, "show_viewport", viewport)
-    _set_icon(modifier, "show_render", render)
-
-
-def _set_icon(modifier: bpy.types.Modifier, icon: str, value: bool) -> None:
-    # Setting an unchanged value makes Blender evaluate the object, too.
-    if getattr(modifier, icon) != value:
-        setattr(modifier, icon, value)
+    assign(modifier, "show_viewport", viewport)
+    assign(modifier, "show_render", render)
 
 
 def _replaced_modifier(

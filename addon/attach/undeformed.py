@@ -129,11 +129,9 @@ def switch(obj: bpy.types.Object, now: layout.Layout, icon: str, is_on: bool, is
     is_clicked  Sinew's own modifier was switched, which they may follow
     """
     for modifier in (obj.modifiers[name] for name in now.helping):
-        # Setting an unchanged value makes Blender evaluate the object, too.
-        if getattr(modifier, icon) != is_on:
-            setattr(modifier, icon, is_on)
-            if not is_clicked:
-                _switched.add(obj.session_uid)
+        if getattr(modifier, icon) != is_on and not is_clicked:
+            _switched.add(obj.session_uid)
+        property_groups.assign(modifier, icon, is_on)
 
 
 def was_switched(obj: bpy.types.Object) -> bool:
@@ -149,8 +147,7 @@ def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     own = adds_rest_position(obj)
     property_groups.store(before, "adds_rest_position", own)
     property_groups.store(before, "marks_rest", is_marked)
-    if obj.add_rest_position_attribute != (is_marked or own):
-        obj.add_rest_position_attribute = is_marked or own
+    property_groups.assign(obj, "add_rest_position_attribute", is_marked or own)
 
 
 def adds_rest_position(obj: bpy.types.Object) -> bool:

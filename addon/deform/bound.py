@@ -31,7 +31,8 @@ from .source import Source
 
 @dataclass(frozen=True)
 class Bound:
-    """Immutable: it is replaced where any of it may be out of date.
+    """It is replaced where any of it may be out of date; one that is bound to the same modifiers, bones and
+    weights keeps the skin stack, with what that has computed.
 
     armatures   the session_uid of each Armature modifier's armature, 0 for none
     options     of each Armature modifier
@@ -51,6 +52,16 @@ class Bound:
     def is_of_another_stack(self, other: Bound | None) -> bool:
         """Whether modifiers, bones or weights differ from the other's: more than the rest points."""
         return other is None or self.skin_stack is not other.skin_stack
+
+    def take_over(self, old: Bound) -> None:
+        """Has the skin stack, if it is the old one's, work with the surface that was read since. Called under
+        the lock of what deforms by it."""
+        if self.is_of_another_stack(old):
+            return
+        skins = self.skin_stack.skins
+        for skin in () if self.source.has_same_surface(old.source) else skins:
+            skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, self.source, skin)
+        self.skin_stack.set_stage_mesh(_stage_mesh(self.source, skins))
 
     @property
     def data_versions(self) -> list[int]:
@@ -106,7 +117,8 @@ class Bound:
 def read(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, now: Layout, old: Bound | None = None
 ) -> Bound:
-    """Reads the object. Binds again only what has changed; returns the same skin stack where nothing has.
+    """Reads the object. Binds again only what has changed; the skin stack is the old one where modifiers,
+    bones and weights have not.
 
     now  the object's layout
     old  given where neither modifiers nor their options changed since
@@ -121,10 +133,6 @@ def read(
         read_now.take_what_equals(old.source)
     spaces_now = [_bones_from_model(obj, replaced.armature, depsgraph) for _modifier, replaced in pairs]
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones, spaces_now):
-        if not read_now.has_same_surface(old.source):
-            for skin in old.skin_stack.skins:
-                skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
-        old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skins))
         return replace(old, source=read_now)
     options = _options_of(obj, now, depsgraph)
     masks = _masks(read_now, groups)
@@ -169,8 +177,6 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
     """
     read_now = source.with_surface(obj, depsgraph, old.source)
     read_now.keep_normals_of(old.source)
-    for skin in old.skin_stack.skins:
-        skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
     return replace(old, source=read_now)
 
 

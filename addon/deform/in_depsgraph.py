@@ -182,12 +182,10 @@ def _memory_to_write(
     or in the evaluated point buffer. None where it does not exist or has another size."""
     points, count = len(skinned.bound.source.points), skinned.normal_count
     if not skinned.plan.in_buffer:
-        to_points = mesh_io.vectors_in(mesh, skinned.noted.attribute)
-        to_normals = _NO_NORMALS
+        of_points, of_normals = skinned.noted.attributes
+        to_points, to_normals = mesh_io.vectors_in(mesh, of_points), _NO_NORMALS
         if count:
-            domain = skinned.plan.normals.domain
-            name = point_store.normals_name(skinned.noted.attribute)
-            to_normals = mesh_io.vectors_in(mesh, name, domain)
+            to_normals = mesh_io.vectors_in(mesh, of_normals, skinned.plan.normals.domain)
         if to_points is None or to_normals is None:
             return None
         return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None

@@ -11,7 +11,16 @@ import bpy
 import numpy as np
 import sinew
 
-from ..attach import attach, layout, normals, properties, stage_settings, undeformed, upstream_proxy
+from ..attach import (
+    attach,
+    layout,
+    normals,
+    point_store,
+    properties,
+    stage_settings,
+    undeformed,
+    upstream_proxy,
+)
 from ..attach.icons import Icons
 from ..attach.layout import Layout
 from ..base.errors import SinewError
@@ -181,7 +190,7 @@ class Noted:
 
     layout               its stack
     own, surroundings    what else decides how it is deformed
-    attribute            the mesh's point attribute; empty where the point buffer has the points
+    attributes           the mesh's attributes of points and of normals; empty where the point buffer has them
     normals_domain       the normals that drew the mesh, as from normals.domain_of()
     volume_keyed         for each Armature modifier, whether an animation chooses between its two methods
     groups               the names of its vertex groups
@@ -196,7 +205,7 @@ class Noted:
     layout: Layout
     own: Own
     surroundings: Surroundings
-    attribute: str
+    attributes: tuple[str, str]
     normals_domain: str
     volume_keyed: list[bool]
     groups: list[str]
@@ -215,7 +224,7 @@ class Noted:
             layout=now,
             own=Own.of(obj, now),
             surroundings=Surroundings.of(obj),
-            attribute=storage.attribute,
+            attributes=(storage.attribute, point_store.normals_name(storage.attribute)),
             normals_domain=normals.domain_of(mesh),
             volume_keyed=[attach.is_volume_followed(obj, skin) for skin in now.skins],
             groups=obj.vertex_groups.keys(),
@@ -272,6 +281,7 @@ class SkinnedObject:
         with self.lock:
             if bound.is_of_another_stack(self.bound):
                 self.shown, self.evaluation = Shown(number=self.shown.number), Evaluation()
+            bound.take_over(self.bound)
             self.bound = bound
 
     @property
