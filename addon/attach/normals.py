@@ -18,7 +18,7 @@ import bpy
 
 from ..base.phrases import phrase
 from ..io import mesh_io
-from ..skinning.shading import GivenNormals
+from ..skinning.shading import NO_NORMALS, GivenNormals
 from . import node_group, properties, upstream_proxy
 from .layout import Layout, Modifier
 from .modifier_types import ONLY_DEFORM
@@ -89,7 +89,7 @@ def given(obj: bpy.types.Object, now: Layout) -> tuple[GivenNormals, str]:
     domain = domain_of(obj.data) if are_given(settings) else ""
     reason = (_obstacle(obj, now) or ("its heat map is shown" if settings.heat else "")) if domain else ""
     if not domain or reason:
-        return GivenNormals(), reason
+        return NO_NORMALS, reason
     are_skinned = settings.normals == properties.SKINNED_NORMALS
     # A downstream modifier that is on in renders alone can need Blender's.
     return GivenNormals(domain, are_skinned, bool(_needing(now, in_renders=True))), ""

@@ -218,7 +218,7 @@ def _equals_but_for_points(
     known = [skin.deformer.weighting for skin in old.skin_stack.skins]
     # Where a bone is the mesh's parent, poses move its space: the one in which it was bound decides.
     has_same_skin = are_equal(read_now.surface_points, old.source.surface_points)
-    return read_now.equals_but_for_points(old.source) and all(
+    return read_now.has_same_weights(old.source) and all(
         now.equals(before.bones) and (has_same_skin or _has_same_limbs(before, read_now, space))
         for now, before, space in zip(bones, known, spaces_now, strict=False)
     )

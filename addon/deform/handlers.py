@@ -45,22 +45,16 @@ def _take_off_drivers_without_modifier() -> None:
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not _was_only_posed(depsgraph):
-        notify(subscribers.evaluated, depsgraph)
-
-
-def _was_only_posed(depsgraph: bpy.types.Depsgraph) -> bool:
-    """Reacts to an update. Returns whether nothing had to be done, as it only posed what Sinew deforms."""
+    is_posed, unshown = False, None
     with updates_suspended() as may_react:
-        if current.is_idle:
-            return False
-        original, unshown = finder("depsgraph_update_post", on_depsgraph_update), None
-        is_posed = may_react and may_change_file() and session.were_only_posed(depsgraph, original)
-        if not is_posed:
-            unshown = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
-    _end_event(depsgraph, unshown)
-    _note_seen("depsgraph_update_post", depsgraph)
-    return is_posed
+        if not current.is_idle:
+            original = finder("depsgraph_update_post", on_depsgraph_update)
+            is_posed = may_react and may_change_file() and session.were_only_posed(depsgraph, original)
+            if not is_posed:
+                unshown = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
+    _end_event("depsgraph_update_post", depsgraph, unshown)
+    if not is_posed:
+        notify(subscribers.evaluated, depsgraph)
 
 
 @persistent
@@ -86,8 +80,7 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
                 unshown = _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
         if depsgraph.scene.rigidbody_world is not None and may_react and may_change_file():
             rigid_bodies.make_again(depsgraph.scene, (obj for obj, _state in current.pairs))
-    _end_event(depsgraph, unshown)
-    _note_seen("frame_change_post", depsgraph)
+    _end_event("frame_change_post", depsgraph, unshown)
 
 
 def _begin_evaluation() -> None:
@@ -105,9 +98,10 @@ def _begin_evaluation() -> None:
         session.name_requests()
 
 
-def _end_event(depsgraph: bpy.types.Depsgraph, unshown: Changes | None) -> None:
+def _end_event(event: str, depsgraph: bpy.types.Depsgraph, unshown: Changes | None) -> None:
     """Whatever Blender evaluates from here to the next event is caused by a handler that changed something.
 
+    event    whose own reaction ends, after which functions behind Sinew's may be called
     unshown  as from _react()
     """
     if unshown is not None:
@@ -119,6 +113,8 @@ def _end_event(depsgraph: bpy.types.Depsgraph, unshown: Changes | None) -> None:
     for _obj, skinned in current.pairs:
         skinned.evaluation.is_event_known = skinned.evaluation.was_tagged
     session.note_shown(depsgraph)
+    is_followed = bool(event) and events.is_last(event, _LAST[-1])
+    current.seen = names_of_changed_meshes(depsgraph) if is_followed else None
 
 
 def _read_changes(depsgraph: bpy.types.Depsgraph, original: Find, frame: bool) -> Changes:
@@ -179,12 +175,6 @@ def _subscribe_behind_others(event: str, function: Callable) -> None:
             events.subscribe(event, each)
 
 
-def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
-    """Called at the end of Sinew's own reaction to an event."""
-    are_called = events.is_last(event, _LAST[-1])
-    current.seen = names_of_changed_meshes(depsgraph) if are_called else None
-
-
 @persistent
 def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
     """Reacts to what handlers behind Sinew's change: Blender evaluates it without an event, but lists it
@@ -223,7 +213,7 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
                     skinned.needs_recheck = True
                     # The upstream proxy is evaluated again only now.
                     skinned.evaluation.changed_unannounced |= obj.data.name_full not in seen
-    _end_event(depsgraph, unshown)
+    _end_event("", depsgraph, unshown)
 
 
 @persistent

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 from enum import Enum
 
 from ..attach.icons import Deformer
-from ..skinning.shading import GivenNormals
+from ..skinning.shading import NO_NORMALS, GivenNormals
 
 # In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
 ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
@@ -65,7 +65,7 @@ class Plan:
     reason: str = ""
     in_buffer: bool = False
     after_update: bool = False
-    normals: GivenNormals = GivenNormals()
+    normals: GivenNormals = NO_NORMALS
     normals_reason: str = ""
     leaves_out: bool = True
     viewport: Deformer = Deformer.SINEW
@@ -157,7 +157,7 @@ class ObjectFacts:
     safe_mode: bool = False
     failure: str = ""
     waits_for: str = ""
-    normals: GivenNormals = GivenNormals()
+    normals: GivenNormals = NO_NORMALS
     normals_reason: str = ""
 
 

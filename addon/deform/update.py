@@ -79,13 +79,12 @@ class _Event:
     changes: Changes
     is_planned: bool = False
     is_read: bool = False
-    inputs: Inputs = Inputs()
     is_copy_outdated: bool | None = None
     is_rescaled: bool = False
     differs: bool = False
 
     def __post_init__(self) -> None:
-        self.plan = self.old
+        self.plan, self.inputs = self.old, Inputs()
         self.bound_before = None if self.skinned is None else self.skinned.bound
         self.was_on = properties.of(self.obj).replaces_modifiers
         self.error = _error_of(self.obj, self.old, self.skinned)

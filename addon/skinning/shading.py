@@ -42,6 +42,9 @@ class GivenNormals:
     are_for_viewport_alone: bool = False
 
 
+NO_NORMALS = GivenNormals()
+
+
 class SurfaceNormals:
     """Computes the normals of a mesh as Blender defines them. For an invalid mesh, as one whose faces lack
     edges, they are zeros, which mean no normals."""

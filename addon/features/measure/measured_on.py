@@ -127,7 +127,7 @@ def _differing(now: Bound, before: Bound) -> list[str]:
     pairs = zip(now.skin_stack.skins, before.skin_stack.skins, strict=False)
     return [
         *(["mesh"] if not (is_same_mesh and are_equal(source.surface_points, known.surface_points)) else []),
-        *(["weights"] if not source.equals_but_for_points(known) or now.groups != before.groups else []),
+        *(["weights"] if not source.has_same_weights(known) or now.groups != before.groups else []),
         *(["bones"] if not all(a.deformer.bones.equals(b.deformer.bones) for a, b in pairs) else []),
         *(["settings"] if now.options != before.options else []),
     ]
