@@ -109,7 +109,7 @@ def _end_event(event: str, depsgraph: bpy.types.Depsgraph, unshown: Changes | No
         # No window need show it.
         with bpy.context.temp_override(scene=depsgraph.scene, view_layer=depsgraph.view_layer):
             session.refresh_between_steps(bpy.context)
-    upstream_proxy.just_made.clear()
+    upstream_proxy.compared.clear()
     for _obj, skinned in current.pairs:
         skinned.evaluation.is_event_known = skinned.evaluation.was_tagged
     session.note_shown(depsgraph)

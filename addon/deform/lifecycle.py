@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import note, overrides, point_store, properties, references, undeformed
+from ..attach import note, overrides, point_store, properties, references, undeformed, upstream_proxy
 from ..attach.feature import Feature
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, phase, updates_suspended
@@ -203,6 +203,7 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
         session.update_all(depsgraph, changes)
         if session.without_upstream():
             session.update_all(context.evaluated_depsgraph_get(), changes)
+        upstream_proxy.compared.clear()
         prepare_for_save()
 
 

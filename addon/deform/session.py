@@ -219,7 +219,7 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
         with contextlib.nullcontext() if without_upstream() else updates_suspended():
             context.view_layer.update()
         note_shown(depsgraph)
-    upstream_proxy.just_made.clear()
+    upstream_proxy.compared.clear()
 
 
 def note_shown(depsgraph: bpy.types.Depsgraph) -> None:

@@ -66,7 +66,7 @@ class _Event:
     plan, is_planned  its plan now, and whether that was made in this event
     is_read           whether any of what was read of it was read again
     inputs            how it differed from that
-    is_copy_outdated  the upstream proxy's copy of the mesh has to be made again; None before it was compared
+    is_copy_outdated  the upstream proxy's copy of the mesh has to be made again
     is_rescaled       lengths among its settings are others for the mesh than before
     differs           its shape may differ from the one that is shown
     """
@@ -79,7 +79,7 @@ class _Event:
     changes: Changes
     is_planned: bool = False
     is_read: bool = False
-    is_copy_outdated: bool | None = None
+    is_copy_outdated: bool = False
     is_rescaled: bool = False
     differs: bool = False
 
@@ -99,6 +99,9 @@ class _Event:
     def follow(self) -> None:
         """Notes another scale of the object, and brings the upstream proxy's copy of the mesh up to date."""
         skinned, mesh, changes = self.skinned, self.obj.data, self.changes
+        if mesh.session_uid in changes.meshes and events.others_are_subscribed():
+            # It is listed by what Sinew has evaluated within the event, as by what others' handlers change.
+            upstream_proxy.compare_again(self.obj)
         if skinned is None or self.is_prevented:
             return
         if skinned.needs_recheck:
@@ -142,7 +145,7 @@ class _Event:
             is_detached=not skinned.is_attached(obj),
             was_skipped=bool(skinned.evaluation.skip_reason) or skinned.noted.name != obj.name,
             is_other=skinned.noted.layout.mode != apply_plan.mode_of(obj)
-            or bool(self.is_copy_outdated)
+            or self.is_copy_outdated
             or (skinned.noted.are_options_keyed and self._has_other_modifiers()),
             is_up_to_date=skinned.is_untouched_by(changes),
         )
@@ -158,15 +161,6 @@ class _Event:
 
     def _has_other_modifiers(self) -> bool:
         return bound.is_of_other_modifiers(self.obj, self.layout, self.skinned.bound, self.depsgraph)
-
-    def _is_copy_known(self) -> bool:
-        """Whether the copy was compared or made in this event. The mesh is listed by what Sinew has evaluated
-        within it, as by what others' handlers change."""
-        is_listed = self.obj.data.session_uid in self.changes.meshes
-        is_new = upstream_proxy.was_just_made(self.obj)
-        return self.is_copy_outdated is not None or (
-            is_new and not (is_listed and events.others_are_subscribed())
-        )
 
     def _is_unrequested(self) -> bool:
         """Computes its shape where Blender did not request it, as where the driver is muted. Returns whether
@@ -223,10 +217,6 @@ class _Event:
             self.seen = _check_modifiers(self.obj, self.layout, self.changes)
             new = self._full_plan()
         if not self._is_applied(facts, new):
-            if not (new.uses_builtin or self._is_copy_known()):
-                self.is_copy_outdated = not upstream_proxy.is_current(self.obj)
-            if self.is_copy_outdated:
-                upstream_proxy.set_outdated(self.obj)
             apply_plan.apply(self.obj, self.old, new)
             self.seen = None
         self.plan, self.is_planned = new, True
