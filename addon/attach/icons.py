@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
 VIEWS = ("viewport", "render")
 
@@ -28,7 +29,7 @@ class Icons:
     sinew: bool
     modifiers: tuple[bool, ...]
 
-    @property
+    @cached_property
     def deformer(self) -> Deformer:
         if not any(self.modifiers):
             return Deformer.NOTHING

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 from ..attach.icons import Deformer
 from ..skinning.shading import NO_NORMALS, GivenNormals
@@ -78,12 +79,12 @@ class Plan:
         is_same = self == replace(other, viewport=self.viewport, render=self.render)
         return is_same and (self.is_in_depsgraph or views == (other.viewport, other.render))
 
-    @property
+    @cached_property
     def uses_builtin(self) -> bool:
         """Whether Sinew does not deform it: its Armature modifiers do, where their icons are on."""
         return not self.is_read or self.state is State.BUILT_IN
 
-    @property
+    @cached_property
     def is_read(self) -> bool:
         """Whether mesh, weights and bones are read."""
         return self.state not in _UNREAD
@@ -97,12 +98,12 @@ class Plan:
         found = (_IN_VIEWPORT.get(self.viewport), _IN_RENDERS.get(self.render))
         return [sentence for sentence in found if sentence is not None]
 
-    @property
+    @cached_property
     def is_in_depsgraph(self) -> bool:
         """Whether Sinew deforms within Blender's evaluation."""
         return not (self.uses_builtin or self.after_update)
 
-    @property
+    @cached_property
     def is_written(self) -> bool:
         """Whether Sinew deforms after it."""
         return self.after_update and not self.uses_builtin

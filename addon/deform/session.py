@@ -24,7 +24,7 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
 from ..base.errors import SinewError
 from ..skinning.precompute import precomputations
-from . import after_update, apply_plan, events, undo
+from . import after_update, apply_plan, events, modifier_edits, undo
 from .bound import uid
 from .changes import GONE, Changes, Find
 from .in_depsgraph import DepsgraphRequests
@@ -419,21 +419,18 @@ def _is_each(holds: Callable[[bpy.types.Object, SkinnedObject], bool]) -> bool:
 
 def _do_all_use_builtin() -> bool:
     """Whether Sinew has nothing to do in a frame, as long as nothing but poses changes."""
-    try:
-        return all(
-            plan_of(obj).state in (State.OFF, State.REFUSED)
-            or (plan_of(obj).uses_builtin and obj.animation_data is None)
-            for obj in current.objects or ()
-        )
-    except ReferenceError:
-        return False
+    return all(
+        plan_of(obj).state in (State.OFF, State.REFUSED)
+        or (plan_of(obj).uses_builtin and obj.animation_data is None)
+        for obj in objects_with_sinew()
+    )
 
 
 def _update(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     old, known = plan_of(obj), skinned_of(obj)
     try:
         now = layout.read(obj) if _may_be_removed(obj, changes) else None
-        if now is not None and _follow_removal(obj, now, old):
+        if now is not None and modifier_edits.follow_removal(obj, now, old, known):
             return
         found = update(obj, now, old, known, depsgraph, changes)
     except ReferenceError:
@@ -480,21 +477,6 @@ def _may_be_removed(obj: bpy.types.Object, changes: Changes) -> bool:
     return obj.is_editable and may_change_file()
 
 
-def _follow_removal(obj: bpy.types.Object, now: layout.Layout, plan: Plan) -> bool:
-    """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
-    if not apply_plan.has_lost_modifier(obj, now, plan):
-        return False
-    skinned = skinned_of(obj)
-    # The last shape is computed only here, not at each pose.
-    rest, shown = (None, None) if skinned is None else (skinned.bound.source.points, skinned.points)
-    apply_plan.follow_removal(obj, rest, shown)
-    if skinned is not None:
-        skinned.take_off_normals(obj.data)
-    current.known.pop(obj.session_uid, None)
-    current.objects = None
-    return True
-
-
 def _remove_groups_taken_apart(changes: Changes) -> None:
     """Removes node groups that were changed: their objects then get new ones, or an error where that happens
     again and again."""
@@ -511,9 +493,7 @@ def _adopt_copied_modifiers(changes: Changes) -> None:
     for obj in changes.edited if may_change_file() else ():
         # The object may have been deleted since.
         with contextlib.suppress(ReferenceError):
-            is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
-            if is_plain and not properties.has_sinew(obj) and not properties.is_copy(obj):
-                changes.structure |= apply_plan.adopt_copied_modifier(obj)
+            changes.structure |= modifier_edits.adopt_copy(obj)
 
 
 def _note_readers(changes: Changes) -> None:

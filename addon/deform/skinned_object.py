@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import cached_property
 from math import isclose
 from typing import NamedTuple
 
@@ -235,7 +236,7 @@ class Noted:
             volume=obj.matrix_world.determinant(),
         )
 
-    @property
+    @cached_property
     def are_options_keyed(self) -> bool:
         """Whether an animation sets options of an Armature modifier beside Preserve Volume."""
         return any(skin.armature.options is None for skin in self.layout.skins)
