@@ -48,12 +48,12 @@ def first_facts(obj: bpy.types.Object, now: Layout, error: str) -> ObjectFacts:
     )
 
 
-def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) -> ObjectFacts:
+def all_facts(obj: bpy.types.Object, now: Layout, failure: str, lacks: str) -> ObjectFacts:
     """Returns all facts of an object that is read.
 
-    now        its layout
-    failure    the error when Sinew deformed it within Blender's evaluation
-    waits_for  what its method needs and is not computed yet
+    now      its layout
+    failure  the error when Sinew deformed it within Blender's evaluation
+    lacks    what its method needs and is not computed yet
     """
     settings, mesh = properties.of(obj), obj.data
     given, reason = normals.given(obj, now)
@@ -67,7 +67,7 @@ def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) 
         has_heat_map=settings.heat,
         safe_mode=safe_mode.is_on(),
         failure=failure,
-        waits_for=waits_for,
+        lacks=lacks,
         normals=given,
         normals_reason=reason,
     )

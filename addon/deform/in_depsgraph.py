@@ -20,7 +20,6 @@ from ..attach.modifier_options import ModifierOptions
 from ..io import mesh_io
 from ..io.actions import animated_paths
 from . import pose, source
-from .plan import State
 from .skinned_object import LeftOut, Shown, SkinnedObject
 
 # How many evaluated copies of an object are remembered.
@@ -125,7 +124,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     number, taken = skinned.shown.number + 1, 1000.0 * (time.perf_counter() - started)
     skinned.shown = Shown(frames, rest_points, values, out[0].tobytes(), number, taken)
     # An animation can choose a method whose data has not been requested yet.
-    is_new_need = skinned.plan.state is not State.WAITING and pose.lacks_data(bound, frames)
+    is_new_need = not skinned.plan.lacks and pose.lacks_data(bound, frames)
     return "what its method needs is not computed" if is_new_need else ""
 
 

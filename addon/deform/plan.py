@@ -22,8 +22,7 @@ class State(Enum):
     LINKED = "linked"  # the Armature modifier: the object belongs to another file
     EDITING = "editing"  # the Armature modifier: tools of the object's mode need it
     BUILT_IN = "built-in"  # the Armature modifier: it has the same shape in less time, or the mode needs it
-    WAITING_UPSTREAM = "waiting upstream"  # Sinew, once Blender has evaluated what it deforms
-    WAITING = "waiting"  # Sinew, with the Armature modifier's method until the chosen one's data is computed
+    WAITING = "waiting"  # Sinew, once Blender has evaluated what it deforms
     IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the usual case
     AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
 
@@ -53,7 +52,8 @@ class Plan:
     reason          one clause for the panel; the error of REFUSED; empty for the usual case and for what the
                     user chose
     in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
-    after_update    Sinew deforms after Blender's evaluation, not within it
+    lacks           what its method needs and is not computed yet, as a clause; meanwhile Sinew deforms it by
+                    the Armature modifier's method
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
     leaves_out      Blender leaves the Armature modifiers out while Sinew deforms within its evaluation:
@@ -65,7 +65,7 @@ class Plan:
     state: State
     reason: str = ""
     in_buffer: bool = False
-    after_update: bool = False
+    lacks: str = ""
     normals: GivenNormals = NO_NORMALS
     normals_reason: str = ""
     leaves_out: bool = True
@@ -101,16 +101,16 @@ class Plan:
     @cached_property
     def is_in_depsgraph(self) -> bool:
         """Whether Sinew deforms within Blender's evaluation."""
-        return not (self.uses_builtin or self.after_update)
+        return self.state is State.IN_DEPSGRAPH
 
     @cached_property
     def is_written(self) -> bool:
         """Whether Sinew deforms after it."""
-        return self.after_update and not self.uses_builtin
+        return self.state is State.AFTER_UPDATE
 
 
 # That of an object before its first evaluation.
-UNSEEN = Plan(State.WAITING_UPSTREAM)
+UNSEEN = Plan(State.WAITING)
 
 
 @dataclass(frozen=True)
@@ -134,8 +134,8 @@ class ObjectFacts:
                                 renders
     safe_mode                   nothing of Sinew may run within Blender's evaluation
     failure                     the error within Blender's evaluation; empty if there was none
-    waits_for                   what its method needs and is not computed yet, as a clause; empty if nothing
-    normals, normals_reason     those of the plan
+    lacks, normals, normals_reason
+                                those of the plan
     """
 
     enabled: bool = True
@@ -157,7 +157,7 @@ class ObjectFacts:
     views_differ: bool = False
     safe_mode: bool = False
     failure: str = ""
-    waits_for: str = ""
+    lacks: str = ""
     normals: GivenNormals = NO_NORMALS
     normals_reason: str = ""
 
@@ -185,12 +185,8 @@ def _plan(facts: ObjectFacts) -> Plan:
     reason = _why_not_in_depsgraph(facts)
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
-    # The route does not change while it waits: afterwards only the method changes.
     state = State.AFTER_UPDATE if reason else State.IN_DEPSGRAPH
-    if facts.waits_for:
-        state = State.WAITING
-    given = facts.normals, facts.normals_reason
-    return Plan(state, facts.waits_for or reason, in_buffer, bool(reason), *given)
+    return Plan(state, reason, in_buffer, facts.lacks, facts.normals, facts.normals_reason)
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

@@ -99,7 +99,7 @@ def stopped(obj: bpy.types.Object, skinned: SkinnedObject) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def waits_for(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
+def lacking(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
     """Returns what its methods need and lack, as a clause for the panel; empty where they lack nothing."""
     if skinned is None:
         return ""

@@ -327,7 +327,7 @@ def needs_first_evaluations() -> bool:
     """Whether an object needs handlers to be deformed in an evaluation, not only the driver."""
     with contextlib.suppress(ReferenceError):
         return any(
-            plan_of(obj).state is State.WAITING_UPSTREAM or plan_of(obj).is_written
+            plan_of(obj).state is State.WAITING or plan_of(obj).is_written
             # After undo and redo the objects have to be found again.
             for obj in (bpy.data.objects if current.objects is None else current.objects)
             if properties.has_sinew(obj)
@@ -357,7 +357,7 @@ def without_upstream() -> set[tuple[int, int]]:
     return {
         (obj.session_uid, uid(properties.of(obj).storage.upstream_proxy))
         for obj in objects_with_sinew()
-        if plan_of(obj).state is State.WAITING_UPSTREAM
+        if plan_of(obj).state is State.WAITING
         and properties.of(obj).replaces_modifiers
         and layout.read(obj).icons[0].sinew
     }

@@ -234,8 +234,8 @@ class _Event:
         failure = ""
         if self.skinned is not None and self.skinned.failures.in_a_row > MAX_FAILURES_IN_A_ROW:
             failure = self.skinned.failures.last
-        waits_for = precomputing.waits_for(self.obj, self.skinned)
-        return plan(apply_plan.all_facts(self.obj, self.layout, failure, waits_for))
+        lacks = precomputing.lacking(self.obj, self.skinned)
+        return plan(apply_plan.all_facts(self.obj, self.layout, failure, lacks))
 
     def is_upstream_there(self) -> bool:
         """Whether Blender has evaluated what the object is made from."""
@@ -303,17 +303,15 @@ class _Event:
             skinned.shown = replace(skinned.shown, frames=None)
 
     def _with_data(self, wanted: Plan) -> Plan:
-        """Requests the data that the methods need and returns the resulting plan. A plan that waits needs the
-        same modifiers and storage as one that does not, so it need not be applied again."""
+        """Requests the data that the methods need, and returns the plan with what they lack. It needs the
+        same modifiers and storage, so it need not be applied again."""
         if wanted.uses_builtin:
             return wanted
         if wanted.normals.domain:
             # Not within Blender's evaluation: it takes as long as several frames.
             self.skinned.bound.source.make_normals()
         precomputing.request(self.obj, self.skinned, self.depsgraph)
-        waits_for = precomputing.waits_for(self.obj, self.skinned)
-        is_same = waits_for == (wanted.reason if wanted.state is State.WAITING else "")
-        return wanted if is_same else self._full_plan()
+        return replace(wanted, lacks=precomputing.lacking(self.obj, self.skinned))
 
     def _note(self, new: Plan) -> None:
         """Notes that the plan was applied, and the state of the object it was applied to."""
@@ -362,7 +360,7 @@ class _Event:
             is_shown = self.obj.visible_get(view_layer=self.depsgraph.view_layer)
             is_evaluated = is_shown and self.obj.evaluated_get(self.depsgraph).is_evaluated
             if skinned is None or is_evaluated:
-                return replace(plan, state=State.WAITING_UPSTREAM)
+                return replace(plan, state=State.WAITING)
         elif skinned is not None:
             skinned.needs_plan |= facts.calls_for_plan
         return self.old if skinned is None else skinned

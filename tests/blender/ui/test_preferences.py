@@ -64,10 +64,10 @@ def test_safe_mode_takes_effect_at_once(preferences, selected, monkeypatch):
     scenes.add_sinew(selected, "dq")
     assert session.skinned_of(selected).plan.is_in_depsgraph
     preferences.safe_mode = True
-    assert session.skinned_of(selected).plan.after_update
+    assert session.skinned_of(selected).plan.is_written
     assert session.skinned_of(selected).plan.reason == "Safe mode"
     preferences.safe_mode = False
     assert session.skinned_of(selected).plan.is_in_depsgraph
     monkeypatch.setenv(safe_mode.VARIABLE, "1")
     session.refresh(bpy.context)
-    assert session.skinned_of(selected).plan.after_update
+    assert session.skinned_of(selected).plan.is_written

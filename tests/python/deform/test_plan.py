@@ -3,7 +3,7 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 from sinew_addon.attach.icons import Deformer, Icons
@@ -46,10 +46,6 @@ TABLE = [
     ({"render": Deformer.ARMATURE, "builtin_is_faster": True}, State.IN_DEPSGRAPH, ""),
     ({**_HIDDEN, "mode": "EDIT"}, State.EDITING, "In this mode"),
     ({**_HIDDEN, "enabled": False}, State.OFF, ""),
-    ({"waits_for": "until found"}, State.WAITING, "until found"),
-    ({"waits_for": "until found", "safe_mode": True}, State.WAITING, "until found"),
-    ({"waits_for": "until found", "mode": "EDIT"}, State.EDITING, "In this mode"),
-    ({"waits_for": "until found", "enabled": False}, State.OFF, ""),
 ]
 
 
@@ -79,21 +75,11 @@ def test_what_is_written_after_the_update_is_in_a_buffer(facts):
     assert plan(ObjectFacts(**facts)).in_buffer
 
 
-@pytest.mark.parametrize("route", [{}, {"safe_mode": True}, {"has_upstream": True}, {"mesh_is_shared": True}])
-def test_who_waits_keeps_its_route(route):
-    """So only the method changes when it ends."""
-    waiting, after = plan(ObjectFacts(**route, waits_for="until found")), plan(ObjectFacts(**route))
-    assert (waiting.in_buffer, waiting.after_update) == (after.in_buffer, after.after_update)
-    assert waiting.is_in_depsgraph == after.is_in_depsgraph == (after.state is State.IN_DEPSGRAPH)
-    assert not waiting.uses_builtin
-
-
 @pytest.mark.parametrize("facts", [facts for facts, *_ in TABLE])
-def test_normals_are_given_by_who_deforms(facts):
-    given = {"normals": GivenNormals("POINT", are_skinned=True), "normals_reason": "Cast follows"}
-    found = plan(ObjectFacts(**facts, **given))
-    is_given = found.state in (State.WAITING, State.IN_DEPSGRAPH, State.AFTER_UPDATE)
-    assert (found.normals == given["normals"]) == bool(found.normals_reason) == is_given
+def test_who_deforms_gives_normals_and_says_what_it_lacks(facts):
+    given = {"normals": GivenNormals("POINT"), "normals_reason": "Cast follows", "lacks": "until found"}
+    plain, found = plan(ObjectFacts(**facts)), plan(ObjectFacts(**facts, **given))
+    assert found == (replace(plain, **given) if plain.is_in_depsgraph or plain.is_written else plain)
 
 
 @pytest.mark.parametrize(
@@ -125,5 +111,5 @@ def test_the_panel_says_what_deforms_in_each_view(viewport, render):
 
 def test_every_fact_matters():
     """A fact that no row changes would not need to be collected."""
-    named = {name for facts, *_ in TABLE for name in facts} | {"normals", "normals_reason"}
+    named = {name for facts, *_ in TABLE for name in facts} | {"normals", "normals_reason", "lacks"}
     assert named == {field.name for field in fields(ObjectFacts)}
