@@ -224,8 +224,9 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
 
 def note_shown(depsgraph: bpy.types.Depsgraph) -> None:
     """Notes the meshes that viewports show, at the end of an event, or of an evaluation by Sinew."""
-    for obj, skinned in living_pairs():
-        skinned.note_shown(obj, depsgraph)
+    for obj, skinned in current.pairs if depsgraph.mode == "VIEWPORT" else ():
+        if not skinned.evaluation.given <= {skinned.viewport_mesh} and _is_alive(obj):
+            skinned.note_shown(obj, depsgraph)
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:
@@ -408,13 +409,16 @@ def were_only_posed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
 def _is_each(holds: Callable[[bpy.types.Object, SkinnedObject], bool]) -> bool:
     """Whether something holds for each object that Sinew reads, and each was read."""
     try:
-        return all(
-            not plan_of(obj).is_read or ((skinned := skinned_of(obj)) is not None and holds(obj, skinned))
-            for obj in current.objects or ()
-        )
+        for obj in current.objects or ():
+            known = current.known.get(obj.session_uid, UNSEEN)
+            was_read = not isinstance(known, Plan)
+            plan = known.plan if was_read else known
+            if plan.is_read and not (was_read and holds(obj, known)):
+                return False
     except ReferenceError:
         # The object was deleted since the list was made.
         return False
+    return True
 
 
 def _do_all_use_builtin() -> bool:
@@ -422,7 +426,7 @@ def _do_all_use_builtin() -> bool:
     return all(
         plan_of(obj).state in (State.OFF, State.REFUSED)
         or (plan_of(obj).uses_builtin and obj.animation_data is None)
-        for obj in objects_with_sinew()
+        for obj in current.objects or ()
     )
 
 

@@ -406,11 +406,10 @@ class SkinnedObject:
         return bool(given) and obj.data.evaluated_get(depsgraph).as_pointer() in given
 
     def note_shown(self, obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> None:
-        """Notes the mesh that viewports show, at the end of an event."""
-        given = self.evaluation.given - {self.viewport_mesh}
-        if given and depsgraph.mode == "VIEWPORT":
-            mesh = obj.data.evaluated_get(depsgraph).as_pointer()
-            self.viewport_mesh = mesh if mesh in given else self.viewport_mesh
+        """Notes the mesh that this depsgraph, a viewport's, shows, if it was given points."""
+        mesh = obj.data.evaluated_get(depsgraph).as_pointer()
+        if mesh in self.evaluation.given:
+            self.viewport_mesh = mesh
 
     def is_attached(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew's modifier is there, with its node group where that is needed. Another add-on's

@@ -135,11 +135,10 @@ class _Event:
     def observe(self) -> Facts:
         """Returns the facts. What would not matter beside the others is not looked at."""
         obj, skinned, changes = self.obj, self.skinned, self.changes
-        facts = Facts(may_change_file(), skinned is not None, self.is_prevented)
         if skinned is None or self.is_prevented:
-            return facts
-        facts = replace(
-            facts,
+            return Facts(may_change_file(), skinned is not None, self.is_prevented)
+        facts = Facts(
+            may_change_file(),
             # What a method needs may have been computed since the evaluation.
             is_due=skinned.needs_plan or skinned.has_new_data or self.is_rescaled,
             is_detached=not skinned.is_attached(obj),
