@@ -177,8 +177,10 @@ def test_a_frame_passes_few_modules_after_the_evaluation(set_up):
     assert session.skinned_of(obj).shown.number == shown + 2
     for function, modules in passed.items():
         print(function, len(modules), *sorted(modules))
-    assert len(passed["on_frame_change"]) <= 8
-    assert len(passed["on_depsgraph_update"]) <= 11
+    assert len(passed["on_frame_change"]) <= 7
+    assert len(passed["on_depsgraph_update"]) <= 10
+    # Blender may call it on another thread.
+    assert len(passed.get("get", ())) <= 15
 
 
 CHANGES = {
