@@ -87,7 +87,7 @@ def _begin_evaluation() -> None:
     is_renamed = False
     for obj, skinned in current.pairs:
         evaluation = skinned.evaluation
-        evaluation.given, evaluation.is_event_known, evaluation.was_tagged = set(), True, False
+        evaluation.given = set()
         try:
             evaluation.is_only_user = skinned.noted.own.mesh_users == obj.data.users
             is_renamed |= skinned.noted.name != obj.name
@@ -99,9 +99,9 @@ def _begin_evaluation() -> None:
 
 
 def _end_event(event: str, depsgraph: bpy.types.Depsgraph, unshown: Changes | None) -> None:
-    """Whatever Blender evaluates from here to the next event is caused by a handler that changed something.
+    """Called at the end of each reaction.
 
-    event    whose own reaction ends, after which functions behind Sinew's may be called
+    event    after whose reaction functions behind Sinew's may be called; empty at their own
     unshown  as from _react()
     """
     if unshown is not None:
@@ -110,8 +110,6 @@ def _end_event(event: str, depsgraph: bpy.types.Depsgraph, unshown: Changes | No
         with bpy.context.temp_override(scene=depsgraph.scene, view_layer=depsgraph.view_layer):
             session.refresh_between_steps(bpy.context)
     upstream_proxy.compared.clear()
-    for _obj, skinned in current.pairs:
-        skinned.evaluation.is_event_known = skinned.evaluation.was_tagged
     session.note_shown(depsgraph)
     is_followed = bool(event) and events.is_last(event, _LAST[-1])
     current.seen = names_of_changed_meshes(depsgraph) if is_followed else None

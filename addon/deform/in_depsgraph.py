@@ -108,7 +108,6 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     is_for_viewports = skinned.viewport_mesh == mesh.as_pointer()
     _leave_out(evaluated, modifiers if is_for_viewports and skinned.plan.leaves_out else [], skinned, icons)
     out, normals = memory
-    _note_unannounced_change(out, skinned)
     frames = pose.read(evaluated, settings, modifiers, skinned, icons)
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
     if rest_points is None:
@@ -122,7 +121,7 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
     evaluation.given.add(mesh.as_pointer())
     evaluation.skip_reason, skinned.failures.in_a_row = "", 0
     number, taken = skinned.shown.number + 1, 1000.0 * (time.perf_counter() - started)
-    skinned.shown = Shown(frames, rest_points, values, out[0].tobytes(), number, taken)
+    skinned.shown = Shown(frames, rest_points, values, number, taken)
     # An animation can choose a method whose data has not been requested yet.
     is_new_need = not skinned.plan.lacks and pose.lacks_data(bound, frames)
     return "what its method needs is not computed" if is_new_need else ""
@@ -163,15 +162,6 @@ def _leave_out(
     # A mark, which goes when Blender copies the icons from the original again (pose.icons_of).
     marked = [m.show_in_editmode or m.name == known.sinew for m in stack_now]
     stack_now.foreach_set("show_in_editmode", marked)
-
-
-def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
-    """Notes a mesh that another add-on's handler changed, for which there is no event: the evaluated mesh is
-    a new copy, without the points that were written last."""
-    evaluation, first_point = skinned.evaluation, skinned.shown.first_point
-    if not (evaluation.is_event_known or skinned.plan.in_buffer) and first_point is not None:
-        evaluation.changed_unannounced |= out[0].tobytes() != first_point
-        skinned.needs_recheck |= evaluation.changed_unannounced
 
 
 def _memory_to_write(

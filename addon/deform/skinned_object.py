@@ -42,7 +42,6 @@ class Shown:
     frames        the inputs of each Armature modifier; None before the first shape
     rest_points   float32 [vertices, 3], the points it was deformed from
     stage_values  the parameters of the stages after the blend
-    first_point   its first point; a different one means that somebody else wrote the points
     number        serial number: each new shape gets another one
     milliseconds  time that computing it took
     """
@@ -50,7 +49,6 @@ class Shown:
     frames: list[ModifierFrame | None] | None = None
     rest_points: np.ndarray | None = None
     stage_values: StageValues = field(default_factory=lambda: NO_STAGES)
-    first_point: bytes | None = None
     number: int = 0
     milliseconds: float = 0.0
 
@@ -78,17 +76,13 @@ class Evaluation:
 
     is_only_user         the mesh has as many users as when the plan was applied
     given                the addresses of the evaluated meshes that were given points
-    is_event_known       Blender called handlers before the evaluation, or Sinew caused it
-    was_tagged           Sinew has tagged the object for another evaluation since
-    changed_unannounced  the mesh was replaced without any event before the evaluation
+    changed_unannounced  the mesh was changed behind Sinew's handlers, and is evaluated without an event
     skip_reason          why a mesh was not given points; empty if it was
     user_error           what the user has to fix before it can be deformed
     """
 
     is_only_user: bool = True
     given: set[int] = field(default_factory=set)
-    is_event_known: bool = True
-    was_tagged: bool = False
     changed_unannounced: bool = False
     skip_reason: str = ""
     user_error: SinewError | None = None

@@ -322,7 +322,7 @@ class _Event:
             skinned.evaluation.is_only_user = True
         # After Sinew's driver is added, as the driver counts as animation, too.
         skinned.noted = Noted.of(obj, self.layout, new, skinned.bound)
-        skinned.needs_plan, skinned.evaluation.was_tagged = False, True
+        skinned.needs_plan = False
         if self.changes.frame and self.depsgraph.mode == "RENDER":
             # Applying the plan can have Blender copy the object again: what the frame has set is set again.
             obj.update_tag(refresh={"OBJECT", "TIME"})
@@ -332,7 +332,7 @@ class _Event:
         obj, skinned, changes = self.obj, self.skinned, self.changes
         if self.plan.is_in_depsgraph and self.differs:
             # Blender then requests its points.
-            skinned.evaluation.skip_reason, skinned.evaluation.was_tagged = "", True
+            skinned.evaluation.skip_reason = ""
             # The object is then copied again, and what the change of frame has set has to be set again:
             # originals of hidden objects do not have it.
             obj.update_tag(refresh={"OBJECT", "TIME"} if changes.frame else {"OBJECT"})
