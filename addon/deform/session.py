@@ -224,9 +224,12 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
 
 def note_shown(depsgraph: bpy.types.Depsgraph) -> None:
     """Notes the meshes that viewports show, at the end of an event, or of an evaluation by Sinew."""
-    for obj, skinned in current.pairs if depsgraph.mode == "VIEWPORT" else ():
-        if not skinned.evaluation.given <= {skinned.viewport_mesh} and _is_alive(obj):
-            skinned.note_shown(obj, depsgraph)
+    new = [pair for pair in current.pairs if not pair[1].evaluation.given <= {pair[1].viewport_mesh}]
+    # Those of renders and exporters are others.
+    if new and depsgraph == depsgraph.view_layer.depsgraph:
+        for obj, skinned in new:
+            if _is_alive(obj):
+                skinned.note_shown(obj, depsgraph)
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:
