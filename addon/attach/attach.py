@@ -369,10 +369,8 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
     stays."""
     settings = properties.of(obj)
     pairs = replaced_modifiers(obj)
-    nearest = [
-        properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0) == "dq"
-        for number, (_modifier, replaced) in enumerate(pairs)
-    ]
+    methods = methods_by_name(settings)
+    nearest = [methods[replaced.name] == "dq" for _modifier, replaced in pairs]
     if settings.before.has_nearest_volume:
         before = [replaced.preserve_volume == replaced.was_nearest for _modifier, replaced in pairs]
         if nearest == before:
@@ -457,7 +455,7 @@ def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
     names = [replaced.name for _modifier, replaced in replaced_modifiers(obj, now)]
     if [replaced.name for replaced in kept] == names:
         return now
-    methods = _methods(settings)
+    methods = methods_by_name(settings)
     for name in methods.keys() - set(names):
         modifier = obj.modifiers.get(name)
         if settings.replaces_modifiers and modifier is not None and modifier.type == "ARMATURE":
@@ -467,18 +465,15 @@ def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
         kept.move(kept.find(name), place)
     if "sinew.method" not in animated_paths(obj):
         settings.method = methods[names[0]]
-    for name, method in _methods(settings).items():
+    for name, method in methods_by_name(settings).items():
         if method != methods[name]:
             kept[name].method = methods[name]
     return layout.read(obj)
 
 
-def _methods(settings: properties.SinewSettings) -> dict[str, str]:
+def methods_by_name(settings: properties.SinewSettings) -> dict[str, str]:
     """Returns the method of each Armature modifier that Sinew replaces, by the modifier's name."""
-    return {
-        replaced.name: properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
-        for number, replaced in enumerate(settings.replaced_modifiers)
-    }
+    return dict(zip(settings.replaced_modifiers.keys(), settings.methods, strict=True))
 
 
 def adopt_pointers(obj: bpy.types.Object, now: Layout) -> None:

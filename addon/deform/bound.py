@@ -265,9 +265,8 @@ def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgrap
 def methods_of(obj: bpy.types.Object) -> list[str]:
     """Returns the methods that its settings name now, each once."""
     settings = properties.of(obj)
-    own = (replaced.method for replaced in list(settings.replaced_modifiers)[1:])
-    named = [settings.method, settings.mixed_method, *own]
-    return [name for name in dict.fromkeys(named) if name in METHODS]
+    named = dict.fromkeys([settings.method, settings.mixed_method, *settings.methods])
+    return [name for name in named if name in METHODS]
 
 
 def is_method_animated(obj: bpy.types.Object) -> bool:

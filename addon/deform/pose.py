@@ -53,11 +53,9 @@ def read(
             f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
         )
     frames: Frames = []
-    for skin, (replaced, armature), takes_part in zip(
-        skinned.bound.skin_stack.skins,
-        modifiers,
-        _taking_part(icons, mode),
-        strict=False,
+    parts = modifiers, settings.methods, _taking_part(icons, mode)
+    for skin, (replaced, armature), own, takes_part in zip(
+        skinned.bound.skin_stack.skins, *parts, strict=False
     ):
         if armature is None or armature.data.is_editmode or not takes_part:
             frames.append(None)
@@ -70,7 +68,6 @@ def read(
                 continue
         pose = _finite(armature_io.read_pose(armature, skin.deformer.bones), skin.deformer.bones)
         number = len(frames)
-        own = properties.method_of_modifier(method, replaced.method, is_first=number == 0)
         is_mixed = skin.deformer.mix_weights is not None and own == method
         if skinned.noted.volume_keyed[number] and own in attach.MODIFIERS_OWN:
             own = method_of(evaluated.modifiers[replaced.name])
