@@ -414,35 +414,26 @@ def _show(modifier: bpy.types.Modifier, viewport: bool, render: bool) -> None:
     assign(modifier, "show_render", render)
 
 
-def _replaced_modifier(
-    obj: bpy.types.Object, now: Layout, modifier: bpy.types.ArmatureModifier
-) -> properties.SinewReplacedModifier:
-    """Returns what Sinew stores about an Armature modifier, and makes it where it is missing."""
-    replaced_modifiers = properties.of(obj).replaced_modifiers
-    kept = ((each, layout.find(now.modifiers, "ARMATURE", each)) for each in replaced_modifiers)
-    same = (each for each, number in kept if number is not None and obj.modifiers[number] == modifier)
-    found = next(same, None)
-    if found is None:
-        found = replaced_modifiers.add()
-        found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
-    property_groups.store(found, "name", modifier.name)
-    property_groups.store(found, "uid", modifier.persistent_uid)
-    return found
-
-
 def replaced_modifiers(obj: bpy.types.Object, now: Layout | None = None) -> Replaced:
     """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
-    it.
+    it, which is made where it is missing.
 
     now  the object's layout; None to read it
     """
     now, kept = now or layout.read(obj), properties.of(obj).replaced_modifiers
-    run, count = [obj.modifiers[name] for name in now.replaced], len(kept)
-    pairs = [(modifier, _replaced_modifier(obj, now, modifier)) for modifier in run]
-    if len(kept) != count:
-        # Adding one makes Blender move the earlier ones in memory.
-        pairs = [(modifier, _replaced_modifier(obj, now, modifier)) for modifier in run]
-    return pairs
+    numbers = [layout.find(now.modifiers, "ARMATURE", each) for each in kept]
+    names = [None if number is None else now.modifiers[number].name for number in numbers]
+    for name in now.replaced:
+        modifier = obj.modifiers[name]
+        if name not in names:
+            names.append(name)
+            made = kept.add()
+            made.preserve_volume, made.was_nearest = modifier.use_deform_preserve_volume, True
+        replaced = kept[names.index(name)]
+        property_groups.store(replaced, "name", name)
+        property_groups.store(replaced, "uid", modifier.persistent_uid)
+    # Adding one has made Blender move the earlier ones in memory.
+    return [(obj.modifiers[name], kept[names.index(name)]) for name in now.replaced]
 
 
 def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
