@@ -286,13 +286,14 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     properties.clear(obj)
 
 
-def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
+def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False, now: Layout | None = None) -> None:
     """On: Sinew's modifier has the icons that the artist gave it. Off: its icons are off, and the Armature
     modifiers deform by themselves.
 
     in_depsgraph  Sinew deforms it within Blender's evaluation
+    now           the object's layout; None to read it
     """
-    settings, now = properties.of(obj), layout.read(obj)
+    settings, now = properties.of(obj), now or layout.read(obj)
     was_on, nodes = settings.replaces_modifiers, obj.modifiers.get(now.sinew)
     if on:
         restore_volume(obj)

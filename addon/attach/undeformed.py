@@ -31,17 +31,15 @@ _OTHER_MESHES = {
 }
 
 
-def ensure(obj: bpy.types.Object) -> dict[str, object]:
-    """Makes the modifiers around Sinew's, and returns inputs of Sinew's."""
-    now = layout.read(obj)
+def ensure(obj: bpy.types.Object, now: layout.Layout) -> tuple[layout.Layout, dict[str, object]]:
+    """Makes the modifiers around Sinew's. Returns the layout after that, and inputs of Sinew's."""
     if not now.neutral and _can_make(obj):
         _make_neutral(obj)
     _ensure_mark(obj, now)
-    if not (now.neutral and now.mark):
-        now = layout.read(obj)
-    is_marked = can_mark(obj) and not loses_marks(obj, stack.position_own(obj, now))
+    now = stack.position_own(obj, now if now.neutral and now.mark else layout.read(obj))
+    is_marked = can_mark(obj) and not loses_marks(obj, now)
     keeps = properties.of(obj).before.adds_rest_position or not is_marked
-    return {
+    return now, {
         node_group.IS_MARKED: is_marked,
         node_group.MARK_TO_REMOVE: "" if keeps else node_group.REST_POSITION,
     }

@@ -104,9 +104,9 @@ def check(obj: bpy.types.Object, now: Layout) -> None:
             )
 
 
-def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
+def ensure(obj: bpy.types.Object, now: Layout) -> bpy.types.Object | None:
     """Returns the copy, made again where the upstream modifiers differ from its own, or the mesh does."""
-    storage, now = properties.of(obj).storage, layout.read(obj)
+    storage = properties.of(obj).storage
     if not is_needed(obj, now):
         remove(obj)
         return None
@@ -121,7 +121,7 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         proxy[_MADE_FROM] = wanted
         if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data):
             share_mesh(obj)
-            return ensure(obj)
+            return ensure(obj, now)
         compared[proxy.session_uid] = True
     return storage.upstream_proxy
 

@@ -73,8 +73,11 @@ def all_facts(obj: bpy.types.Object, now: Layout, failure: str, lacks: str) -> O
     )
 
 
-def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
-    """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
+def apply(obj: bpy.types.Object, now: Layout, old: Plan, wanted: Plan) -> None:
+    """now: the object's layout
+
+    Raises SinewError where the modifiers before Sinew cannot be evaluated separately.
+    """
     if obj.library is not None:
         # Its own file was saved so that its Armature modifier deforms it.
         return
@@ -87,10 +90,10 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
             if is_given_up:
                 # It was saved while it was on, and Sinew has not deformed it since it was appended.
                 attach.restore_volume(obj)
-            stack.position_own(obj, layout.read(obj))
+            stack.position_own(obj, now)
             return
-        attach.switch(obj, on=False)
-        attach.adopt_pointers(obj, stack.position_own(obj, layout.read(obj)))
+        attach.switch(obj, on=False, now=now)
+        attach.adopt_pointers(obj, stack.position_own(obj, now))
         if is_given_up:
             point_store.remove_point_attributes(obj)
             upstream_proxy.remove(obj)
@@ -102,10 +105,10 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         else:
             attach.restore_volume(obj)
         return
-    given = wanted.normals
-    point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
-    attach.switch(obj, on=True, in_depsgraph=wanted.is_in_depsgraph)
-    attach.restore_pointers(obj, layout.read(obj))
+    given, in_renders = wanted.normals.domain, not wanted.normals.are_for_viewport_alone
+    now = point_store.ensure(obj, now, wanted.in_buffer, given, in_renders)
+    attach.switch(obj, True, wanted.is_in_depsgraph, now)
+    attach.restore_pointers(obj, now)
 
 
 def apply_driver(obj: bpy.types.Object, now: Layout, bound: Bound, wanted: Plan) -> None:

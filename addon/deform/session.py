@@ -469,7 +469,7 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
         log.error("%s", text, exc_info=error)
         current.told[obj.session_uid] = text
     try:
-        apply_plan.apply(obj, old, refused)
+        apply_plan.apply(obj, layout.read(obj), old, refused)
     except Exception as failure:
         log.error("%s: its Armature modifier may not deform it: %s", obj.name, failure, exc_info=failure)
     return refused

@@ -216,7 +216,7 @@ class _Event:
             self.seen = _check_modifiers(self.obj, self.layout, self.changes)
             new = self._full_plan()
         if not self._is_applied(facts, new):
-            apply_plan.apply(self.obj, self.old, new)
+            apply_plan.apply(self.obj, self.layout, self.old, new)
             self.seen = None
         self.plan, self.is_planned = new, True
 
