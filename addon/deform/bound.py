@@ -152,7 +152,7 @@ def read(
             ModifierSkin(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
         )
     weighting = skins[0].deformer.weighting
-    facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
+    facts = survey.describe(obj, now, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
     skin_stack = SkinStack(skins, StagesAfter(_stage_mesh(read_now, skins), masks))
     return Bound(armatures, options, read_now, skin_stack, facts, groups)
