@@ -30,7 +30,7 @@ from . import (
     undeformed,
     upstream_proxy,
 )
-from .icons import VIEWS, Deformer
+from .icons import ICONS, Deformer
 from .layout import Layout, method_of
 from .property_groups import assign
 from .stack import armature_modifier, sinew_modifier
@@ -304,7 +304,7 @@ def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False, now: Lay
     if nodes is not None:
         # In edit mode the Armature modifiers deform.
         assign(nodes, "show_in_editmode", False)
-    for view in range(len(VIEWS)):
+    for view in range(len(ICONS)):
         _switch_own(obj, now, view, on, was_on, in_depsgraph)
     undeformed.mark(obj, on)
     property_groups.store(settings.stack, "replaces_modifiers", on)
@@ -318,7 +318,7 @@ def _switch_own(
 ) -> None:
     """Switches an icon of Sinew's modifiers, unless an animation does."""
     known, is_shown, is_clicked = properties.of(obj).stack, on, on != was_on
-    icon, nodes = f"show_{VIEWS[view]}", obj.modifiers.get(now.sinew)
+    icon, nodes = ICONS[view], obj.modifiers.get(now.sinew)
     if nodes is not None and not now.by_name[now.sinew].keyed[view]:
         if was_on:
             is_clicked |= getattr(known, icon) != getattr(nodes, icon)
@@ -344,10 +344,10 @@ def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
     if not (is_left and now.sinew) or obj.mode in ("EDIT", "SCULPT"):
         return False
     nodes = now.by_name[now.sinew]
-    for name, is_shown, is_keyed in zip(VIEWS, nodes.shown, nodes.keyed, strict=True):
+    for icon, is_shown, is_keyed in zip(ICONS, nodes.shown, nodes.keyed, strict=True):
         if is_shown and not is_keyed:
             property_groups.store(settings, "leave_small", False)
-            property_groups.store(settings.stack, f"show_{name}", True)
+            property_groups.store(settings.stack, icon, True)
             is_switched = True
     return is_switched
 
@@ -355,13 +355,13 @@ def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
     settings, now = properties.of(obj), layout.read(obj)
-    for view, name in enumerate(VIEWS):
-        property_groups.store(settings.stack, f"show_{name}", True)
+    for view, icon in enumerate(ICONS):
+        property_groups.store(settings.stack, icon, True)
         if settings.replaces_modifiers and now.sinew and not now.by_name[now.sinew].keyed[view]:
-            assign(obj.modifiers[now.sinew], f"show_{name}", True)
+            assign(obj.modifiers[now.sinew], icon, True)
         if now.icons[view].deformer is Deformer.NOTHING:
             for skin in now.skins:
-                assign(obj.modifiers[skin.name], f"show_{name}", True)
+                assign(obj.modifiers[skin.name], icon, True)
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:

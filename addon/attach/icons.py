@@ -11,7 +11,8 @@ from dataclasses import dataclass
 from enum import Enum
 from functools import cached_property
 
-VIEWS = ("viewport", "render")
+# The properties of a modifier that they are.
+ICONS = ("show_viewport", "show_render")
 
 
 class Deformer(Enum):

@@ -14,7 +14,7 @@ import numpy as np
 import sinew
 
 from ..attach import point_store, properties
-from ..attach.icons import VIEWS, Deformer, Icons
+from ..attach.icons import ICONS, Deformer, Icons
 from ..attach.layout import is_deforming_body
 from ..attach.modifier_options import ModifierOptions
 from ..io import mesh_io
@@ -150,15 +150,15 @@ def _leave_out(
         # Each frame of a render can have made one.
         skinned.left_out.clear()
     skinned.left_out[copy] = LeftOut(left_out, icons)
-    for view, of_view in zip(VIEWS, icons, strict=True):
+    for icon, of_view in zip(ICONS, icons, strict=True):
         is_by_sinew = of_view.deformer is Deformer.SINEW
         shown = [
             is_by_sinew
             if m.name in known.own
-            else getattr(m, f"show_{view}") and not (is_by_sinew and m.name in left_out)
+            else getattr(m, icon) and not (is_by_sinew and m.name in left_out)
             for m in stack_now
         ]
-        stack_now.foreach_set(f"show_{view}", shown)
+        stack_now.foreach_set(icon, shown)
     # A mark, which goes when Blender copies the icons from the original again (pose.icons_of).
     marked = [m.show_in_editmode or m.name == known.sinew for m in stack_now]
     stack_now.foreach_set("show_in_editmode", marked)

@@ -6,7 +6,7 @@ import logging
 import bpy
 
 from ..attach import attach, layout, node_group, point_store, properties, property_groups
-from ..attach.icons import VIEWS
+from ..attach.icons import ICONS
 from ..attach.layout import Layout
 from ..base.errors import SinewError
 from .plan import Plan, State
@@ -70,8 +70,8 @@ def adopt_copy(obj: bpy.types.Object) -> bool:
     settings, others = properties.of(obj), properties.of(origin)
     properties.share(origin, obj)
     property_groups.copy(others.before.smooth, settings.before.smooth)
-    for name, icons in zip(VIEWS, layout.read(origin).icons, strict=True):
-        property_groups.store(settings.stack, f"show_{name}", icons.sinew)
+    for icon, icons in zip(ICONS, layout.read(origin).icons, strict=True):
+        property_groups.store(settings.stack, icon, icons.sinew)
     for replaced in settings.replaced_modifiers:
         replaced.was_off = replaced.name in kept and kept[replaced.name].was_off
     for replaced in list(settings.replaced_modifiers)[1:]:

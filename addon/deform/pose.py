@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..attach import attach, properties, stack, stage_settings
-from ..attach.icons import Deformer, Icons
+from ..attach.icons import ICONS, Deformer, Icons
 from ..attach.layout import method_of
 from ..base.errors import SinewError
 from ..io import armature_io, spaces
@@ -163,8 +163,7 @@ def icons_of(
         return skinned.noted.layout.icons if left_out is None else left_out.icons
     replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
     viewport, render = (
-        Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced))
-        for icon in ("show_viewport", "show_render")
+        Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced)) for icon in ICONS
     )
     return viewport, render
 
