@@ -164,7 +164,8 @@ def _subscribe_behind_others(event: str, function: Callable) -> None:
     if current.seen is not None or events.is_last(event, function):
         return
     are_there = events.is_last(event, _LAST[-1])
-    are_needed = bool(current.objects) and events.others_follow(event, function)
+    # After an undo step, the objects have to be found again.
+    are_needed = current.objects != [] and events.others_follow(event, function)
     if are_there == are_needed:
         return
     for each in _LAST:
