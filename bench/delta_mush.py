@@ -86,7 +86,7 @@ def of_library(obj: bpy.types.Object) -> dict[str, float]:
     """Times of the library's own calls, on one thread."""
     bpy.context.scene.frame_set(11)
     rest, topology = mesh_io.read_points(obj.data), mesh_io.read_topology(obj.data)
-    points = session.state_of(obj).points.copy()
+    points = session.skinned_of(obj).points.copy()
     out = np.empty_like(points)
     found = {}
     for kind, iterations in CASES:

@@ -67,7 +67,7 @@ def measure(vertices: int, with_sinew: bool) -> dict[str, float]:
         from sinew_addon.skinning.precompute import precomputations
 
         small_meshes.is_used = False
-        precomputations.waits = True
+        precomputations.blocks = True
 
         def add(_number: int) -> None:
             attach.add(obj, "dq")

@@ -30,8 +30,9 @@ from . import (
     undeformed,
     upstream_proxy,
 )
-from .icons import VIEWS, Deformer
+from .icons import ICONS, Deformer
 from .layout import Layout, method_of
+from .property_groups import assign
 from .stack import armature_modifier, sinew_modifier
 from .subscribers import notify, subscribers
 from .updates import updates_suspended
@@ -285,13 +286,14 @@ def _take_off(obj: bpy.types.Object, is_by_others: bool) -> None:
     properties.clear(obj)
 
 
-def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
+def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False, now: Layout | None = None) -> None:
     """On: Sinew's modifier has the icons that the artist gave it. Off: its icons are off, and the Armature
     modifiers deform by themselves.
 
     in_depsgraph  Sinew deforms it within Blender's evaluation
+    now           the object's layout; None to read it
     """
-    settings, now = properties.of(obj), layout.read(obj)
+    settings, now = properties.of(obj), now or layout.read(obj)
     was_on, nodes = settings.replaces_modifiers, obj.modifiers.get(now.sinew)
     if on:
         restore_volume(obj)
@@ -301,8 +303,8 @@ def switch(obj: bpy.types.Object, on: bool, in_depsgraph: bool = False) -> None:
         pose_driver.remove(obj)
     if nodes is not None:
         # In edit mode the Armature modifiers deform.
-        _set_icon(nodes, "show_in_editmode", False)
-    for view in range(len(VIEWS)):
+        assign(nodes, "show_in_editmode", False)
+    for view in range(len(ICONS)):
         _switch_own(obj, now, view, on, was_on, in_depsgraph)
     undeformed.mark(obj, on)
     property_groups.store(settings.stack, "replaces_modifiers", on)
@@ -316,13 +318,13 @@ def _switch_own(
 ) -> None:
     """Switches an icon of Sinew's modifiers, unless an animation does."""
     known, is_shown, is_clicked = properties.of(obj).stack, on, on != was_on
-    icon, nodes = f"show_{VIEWS[view]}", obj.modifiers.get(now.sinew)
+    icon, nodes = ICONS[view], obj.modifiers.get(now.sinew)
     if nodes is not None and not now.by_name[now.sinew].keyed[view]:
         if was_on:
             is_clicked |= getattr(known, icon) != getattr(nodes, icon)
             property_groups.store(known, icon, getattr(nodes, icon))
         is_shown = on and getattr(known, icon)
-        _set_icon(nodes, icon, is_shown)
+        assign(nodes, icon, is_shown)
     # Within the evaluation, in_depsgraph.py switches them: a click evaluates the object once.
     is_clicked |= not is_shown
     undeformed.switch(obj, now, icon, on if in_depsgraph else is_shown, is_clicked)
@@ -338,13 +340,14 @@ def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
     """Takes over that the artist switched Sinew's modifier on where a small mesh is left to Blender. Returns
     whether it was."""
     settings, is_switched = properties.of(obj), False
-    if settings.replaces_modifiers or not now.sinew or obj.mode in ("EDIT", "SCULPT"):
+    is_left = settings.enabled and not settings.replaces_modifiers and obj.library is None
+    if not (is_left and now.sinew) or obj.mode in ("EDIT", "SCULPT"):
         return False
     nodes = now.by_name[now.sinew]
-    for name, is_shown, is_keyed in zip(VIEWS, nodes.shown, nodes.keyed, strict=True):
+    for icon, is_shown, is_keyed in zip(ICONS, nodes.shown, nodes.keyed, strict=True):
         if is_shown and not is_keyed:
             property_groups.store(settings, "leave_small", False)
-            property_groups.store(settings.stack, f"show_{name}", True)
+            property_groups.store(settings.stack, icon, True)
             is_switched = True
     return is_switched
 
@@ -352,13 +355,13 @@ def follow_own_icons(obj: bpy.types.Object, now: Layout) -> bool:
 def show(obj: bpy.types.Object) -> None:
     """Has Sinew deform it in both views, whatever was switched before."""
     settings, now = properties.of(obj), layout.read(obj)
-    for view, name in enumerate(VIEWS):
-        property_groups.store(settings.stack, f"show_{name}", True)
+    for view, icon in enumerate(ICONS):
+        property_groups.store(settings.stack, icon, True)
         if settings.replaces_modifiers and now.sinew and not now.by_name[now.sinew].keyed[view]:
-            _set_icon(obj.modifiers[now.sinew], f"show_{name}", True)
+            assign(obj.modifiers[now.sinew], icon, True)
         if now.icons[view].deformer is Deformer.NOTHING:
             for skin in now.skins:
-                _set_icon(obj.modifiers[skin.name], f"show_{name}", True)
+                assign(obj.modifiers[skin.name], icon, True)
 
 
 def use_nearest_volume(obj: bpy.types.Object) -> None:
@@ -367,10 +370,8 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
     stays."""
     settings = properties.of(obj)
     pairs = replaced_modifiers(obj)
-    nearest = [
-        properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0) == "dq"
-        for number, (_modifier, replaced) in enumerate(pairs)
-    ]
+    methods = methods_by_name(settings)
+    nearest = [methods[replaced.name] == "dq" for _modifier, replaced in pairs]
     if settings.before.has_nearest_volume:
         before = [replaced.preserve_volume == replaced.was_nearest for _modifier, replaced in pairs]
         if nearest == before:
@@ -383,7 +384,7 @@ def use_nearest_volume(obj: bpy.types.Object) -> None:
             wanted = own
         property_groups.store(replaced, "preserve_volume", own)
         property_groups.store(replaced, "was_nearest", own == wanted)
-        _preserve_volume(modifier, wanted)
+        assign(modifier, "use_deform_preserve_volume", wanted)
     property_groups.store(settings.before, "has_nearest_volume", True)
 
 
@@ -397,7 +398,7 @@ def restore_volume(obj: bpy.types.Object) -> bool:
         modifier = stack.modifier_of(obj, replaced)
         # What the artist has switched since stays, too.
         if modifier is not None and not replaced.was_nearest:
-            _preserve_volume(modifier, replaced.preserve_volume)
+            assign(modifier, "use_deform_preserve_volume", replaced.preserve_volume)
     property_groups.store(settings.before, "has_nearest_volume", False)
     return True
 
@@ -409,51 +410,31 @@ def has_switched_volume(obj: bpy.types.Object) -> bool:
     return settings.before.has_nearest_volume and not are_nearest
 
 
-def _preserve_volume(modifier: bpy.types.ArmatureModifier, preserve: bool) -> None:
-    if modifier.use_deform_preserve_volume != preserve:
-        modifier.use_deform_preserve_volume = preserve
-
-
 def _show(modifier: bpy.types.Modifier, viewport: bool, render: bool) -> None:
-    _set_icon(modifier, "show_viewport", viewport)
-    _set_icon(modifier, "show_render", render)
-
-
-def _set_icon(modifier: bpy.types.Modifier, icon: str, value: bool) -> None:
-    # Setting an unchanged value makes Blender evaluate the object, too.
-    if getattr(modifier, icon) != value:
-        setattr(modifier, icon, value)
-
-
-def _replaced_modifier(
-    obj: bpy.types.Object, now: Layout, modifier: bpy.types.ArmatureModifier
-) -> properties.SinewReplacedModifier:
-    """Returns what Sinew stores about an Armature modifier, and makes it where it is missing."""
-    replaced_modifiers = properties.of(obj).replaced_modifiers
-    kept = ((each, layout.find(now.modifiers, "ARMATURE", each)) for each in replaced_modifiers)
-    same = (each for each, number in kept if number is not None and obj.modifiers[number] == modifier)
-    found = next(same, None)
-    if found is None:
-        found = replaced_modifiers.add()
-        found.preserve_volume, found.was_nearest = modifier.use_deform_preserve_volume, True
-    property_groups.store(found, "name", modifier.name)
-    property_groups.store(found, "uid", modifier.persistent_uid)
-    return found
+    assign(modifier, "show_viewport", viewport)
+    assign(modifier, "show_render", render)
 
 
 def replaced_modifiers(obj: bpy.types.Object, now: Layout | None = None) -> Replaced:
     """Returns the Armature modifiers that Sinew replaces, in their order, each with what Sinew stores about
-    it.
+    it, which is made where it is missing.
 
     now  the object's layout; None to read it
     """
     now, kept = now or layout.read(obj), properties.of(obj).replaced_modifiers
-    run, count = [obj.modifiers[name] for name in now.replaced], len(kept)
-    pairs = [(modifier, _replaced_modifier(obj, now, modifier)) for modifier in run]
-    if len(kept) != count:
-        # Adding one makes Blender move the earlier ones in memory.
-        pairs = [(modifier, _replaced_modifier(obj, now, modifier)) for modifier in run]
-    return pairs
+    numbers = [layout.find(now.modifiers, "ARMATURE", each) for each in kept]
+    names = [None if number is None else now.modifiers[number].name for number in numbers]
+    for name in now.replaced:
+        modifier = obj.modifiers[name]
+        if name not in names:
+            names.append(name)
+            made = kept.add()
+            made.preserve_volume, made.was_nearest = modifier.use_deform_preserve_volume, True
+        replaced = kept[names.index(name)]
+        property_groups.store(replaced, "name", name)
+        property_groups.store(replaced, "uid", modifier.persistent_uid)
+    # Adding one has made Blender move the earlier ones in memory.
+    return [(obj.modifiers[name], kept[names.index(name)]) for name in now.replaced]
 
 
 def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
@@ -466,7 +447,7 @@ def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
     names = [replaced.name for _modifier, replaced in replaced_modifiers(obj, now)]
     if [replaced.name for replaced in kept] == names:
         return now
-    methods = _methods(settings)
+    methods = methods_by_name(settings)
     for name in methods.keys() - set(names):
         modifier = obj.modifiers.get(name)
         if settings.replaces_modifiers and modifier is not None and modifier.type == "ARMATURE":
@@ -476,18 +457,15 @@ def follow_stack(obj: bpy.types.Object, now: Layout) -> Layout:
         kept.move(kept.find(name), place)
     if "sinew.method" not in animated_paths(obj):
         settings.method = methods[names[0]]
-    for name, method in _methods(settings).items():
+    for name, method in methods_by_name(settings).items():
         if method != methods[name]:
             kept[name].method = methods[name]
     return layout.read(obj)
 
 
-def _methods(settings: properties.SinewSettings) -> dict[str, str]:
+def methods_by_name(settings: properties.SinewSettings) -> dict[str, str]:
     """Returns the method of each Armature modifier that Sinew replaces, by the modifier's name."""
-    return {
-        replaced.name: properties.method_of_modifier(settings.method, replaced.method, is_first=number == 0)
-        for number, replaced in enumerate(settings.replaced_modifiers)
-    }
+    return dict(zip(settings.replaced_modifiers.keys(), settings.methods, strict=True))
 
 
 def adopt_pointers(obj: bpy.types.Object, now: Layout) -> None:

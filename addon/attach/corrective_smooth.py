@@ -131,6 +131,4 @@ def switch(obj: bpy.types.Object, viewport: bool, render: bool) -> None:
     if modifier is None:
         return
     for name, is_own in (("show_viewport", viewport), ("show_render", render)):
-        # Setting an unchanged value makes Blender evaluate the object, too.
-        if getattr(modifier, name) != (is_own and getattr(replaced, name)):
-            setattr(modifier, name, not getattr(modifier, name))
+        property_groups.assign(modifier, name, is_own and getattr(replaced, name))

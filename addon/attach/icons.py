@@ -9,8 +9,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from enum import Enum
+from functools import cached_property
 
-VIEWS = ("viewport", "render")
+# The properties of a modifier that they are.
+ICONS = ("show_viewport", "show_render")
 
 
 class Deformer(Enum):
@@ -28,7 +30,7 @@ class Icons:
     sinew: bool
     modifiers: tuple[bool, ...]
 
-    @property
+    @cached_property
     def deformer(self) -> Deformer:
         if not any(self.modifiers):
             return Deformer.NOTHING

@@ -15,7 +15,7 @@ import bpy
 
 from ..io.actions import animated_paths
 from . import node_group, properties
-from .icons import VIEWS, Deformer, Icons
+from .icons import ICONS, Deformer, Icons
 from .modifier_options import NAMES, ModifierOptions
 from .modifier_types import HARMLESS_UPSTREAM, LEFT_OUT_IN_PAINT, ONLY_DEFORM, PAINT_MODES
 
@@ -239,7 +239,7 @@ def _own_icons(obj: bpy.types.Object, sinew: str) -> tuple[bool, bool]:
         return True, True
     kept = properties.of(obj).stack
     own = obj.modifiers[sinew] if kept.replaces_modifiers and sinew else kept
-    viewport, render = (getattr(own, f"show_{view}") for view in VIEWS)
+    viewport, render = (getattr(own, icon) for icon in ICONS)
     return viewport, render
 
 

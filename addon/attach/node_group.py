@@ -51,6 +51,17 @@ _MARK_SOCKETS = {
     ),
     MARK_TO_REMOVE: ("NodeSocketString", "Attribute of rest positions that is not needed behind"),
 }
+_SOCKETS = {
+    ATTRIBUTE: {"Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex")},
+    POINT_BUFFER: {
+        "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
+        "Upstream": (
+            "NodeSocketObject",
+            "Object that has the upstream modifiers, to be evaluated with this one",
+        ),
+    },
+}
+_NORMALS_SOCKET = ("NodeSocketString", "Attribute that holds the normals")
 # What a node reads: a socket, or the first output of a node.
 _Source = bpy.types.NodeSocket | bpy.types.Node
 POSE_SOCKET = ("NodeSocketFloat", "Carries the driver by which Blender requests the points from Sinew")
@@ -76,9 +87,7 @@ def get_or_make(kind: int, normals: str = "") -> bpy.types.NodeTree:
     """
     group = find(kind + _WITH_NORMALS[normals])
     if group is None:
-        made = _make_for_attribute(normals) if kind == ATTRIBUTE else _make_for_buffer(normals)
-        note_structure(made)
-        return made
+        return _make(kind, normals)
     # One that was appended has it from its file.
     _remove_warning(group)
     return group
@@ -318,23 +327,31 @@ def _without_own(group: bpy.types.NodeTree, geometry: _Source, source: bpy.types
     return own
 
 
-def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
+def _make(kind: int, normals: str) -> bpy.types.NodeTree:
+    makers = {ATTRIBUTE: ("Sinew", _of_attribute), POINT_BUFFER: ("Sinew Point Buffer", _of_buffer)}
+    name, add_nodes = makers[kind]
     group = new_group(
-        _name("Sinew", normals),
-        ATTRIBUTE + _WITH_NORMALS[normals],
+        f"{name} with {normals.title()} Normals" if normals else name,
+        kind + _WITH_NORMALS[normals],
         {
-            "Points": ("NodeSocketString", "Attribute that holds the deformed position of each vertex"),
-            **({NORMALS: ("NodeSocketString", "Attribute that holds the normals")} if normals else {}),
+            **_SOCKETS[kind],
+            **({NORMALS: _NORMALS_SOCKET} if normals and kind == ATTRIBUTE else {}),
             **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
             **_MARK_SOCKETS,
             POSE: POSE_SOCKET,
         },
     )
     source = add(group, "NodeGroupInput")
+    add(group, "NodeGroupOutput", {"Geometry": add_nodes(group, source, normals)})
+    note_structure(group)
+    return group
+
+
+def _of_attribute(group: bpy.types.NodeTree, source: bpy.types.Node, normals: str) -> bpy.types.Node:
     given = source.outputs
     named = named_attribute(group, given["Points"])
     # Not Set Position, which would compute an offset for each point.
-    place = add(
+    moved = add(
         group,
         "GeometryNodeStoreNamedAttribute",
         {
@@ -346,13 +363,11 @@ def _make_for_attribute(normals: str) -> bpy.types.NodeTree:
         },
         data_type="FLOAT_VECTOR",
     )
-    moved = place
     if normals:
         named = named_attribute(group, given[NORMALS])
         first = sample(group, moved, named, 0, normals)
         moved = _with_normals(group, source, moved, named, first, normals)
-    add(group, "NodeGroupOutput", {"Geometry": _without_own(group, moved, source)})
-    return group
+    return _without_own(group, moved, source)
 
 
 def _is_deformed(group: bpy.types.NodeTree, source: bpy.types.Node) -> bpy.types.Node:
@@ -381,26 +396,7 @@ def _with_normals(
     return _switch(group, _logic(group, "AND", is_given, is_here), geometry, give)
 
 
-def _name(name: str, normals: str) -> str:
-    return f"{name} with {normals.title()} Normals" if normals else name
-
-
-def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
-    group = new_group(
-        _name("Sinew Point Buffer", normals),
-        POINT_BUFFER + _WITH_NORMALS[normals],
-        {
-            "Points": ("NodeSocketObject", "Object whose vertices are the deformed positions"),
-            "Upstream": (
-                "NodeSocketObject",
-                "Object that has the upstream modifiers, to be evaluated with this one",
-            ),
-            **({IN_RENDERS: IN_RENDERS_SOCKET} if normals else {}),
-            **_MARK_SOCKETS,
-            POSE: POSE_SOCKET,
-        },
-    )
-    source = add(group, "NodeGroupInput")
+def _of_buffer(group: bpy.types.NodeTree, source: bpy.types.Node, normals: str) -> bpy.types.Node:
     given = source.outputs
     buffer = add(group, "GeometryNodeObjectInfo", {"Object": given["Points"]}).outputs["Geometry"]
     index, stored = add(group, "GeometryNodeInputIndex"), add(group, "GeometryNodeInputPosition")
@@ -425,9 +421,7 @@ def _make_for_buffer(normals: str) -> bpy.types.NodeTree:
         moved = _switch(group, fits, moved, _with_normals(group, source, moved, normal, first, normals))
     # This switch is never on: a node that names the object makes Blender evaluate it.
     upstream_proxy = add(group, "GeometryNodeObjectInfo", {"Object": given["Upstream"]})
-    result = _switch(group, False, moved, upstream_proxy.outputs["Geometry"])
-    add(group, "NodeGroupOutput", {"Geometry": result})
-    return group
+    return _switch(group, False, moved, upstream_proxy.outputs["Geometry"])
 
 
 def same_count(

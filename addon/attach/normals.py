@@ -18,6 +18,7 @@ import bpy
 
 from ..base.phrases import phrase
 from ..io import mesh_io
+from ..skinning.shading import NO_NORMALS, GivenNormals
 from . import node_group, properties, upstream_proxy
 from .layout import Layout, Modifier
 from .modifier_types import ONLY_DEFORM
@@ -81,9 +82,21 @@ def domain_of(mesh: bpy.types.Mesh) -> str:
     return domain if domain in ("POINT", "CORNER") else ""
 
 
-def obstacle(obj: bpy.types.Object, now: Layout) -> str:
-    """Returns why Blender has to compute the normals of a skinned object, as a clause; empty where it need
-    not."""
+def given(obj: bpy.types.Object, now: Layout) -> tuple[GivenNormals, str]:
+    """Returns the normals that Sinew gives a skinned object, and why Blender computes them although the user
+    wants Sinew to, as a clause."""
+    settings = properties.of(obj)
+    domain = domain_of(obj.data) if are_given(settings) else ""
+    reason = (_obstacle(obj, now) or ("its heat map is shown" if settings.heat else "")) if domain else ""
+    if not domain or reason:
+        return NO_NORMALS, reason
+    are_skinned = settings.normals == properties.SKINNED_NORMALS
+    # A downstream modifier that is on in renders alone can need Blender's.
+    return GivenNormals(domain, are_skinned, bool(_needing(now, in_renders=True))), ""
+
+
+def _obstacle(obj: bpy.types.Object, now: Layout) -> str:
+    """Returns why Blender has to compute the normals, as a clause; empty where it need not."""
     known = _known_upstream(obj, now)
     for modifier in now.ahead:
         if modifier.kind not in known and modifier.can_be_on:
@@ -95,12 +108,6 @@ def obstacle(obj: bpy.types.Object, now: Layout) -> str:
     if is_read_by_others(obj):
         return "another object reads its mesh"
     return ""
-
-
-def is_for_viewport_alone(now: Layout) -> bool:
-    """Whether Blender has to compute the normals in renders, for a downstream modifier that is on only
-    there."""
-    return bool(_needing(now, in_renders=True))
 
 
 def _known_upstream(obj: bpy.types.Object, now: Layout) -> set[str]:

@@ -31,14 +31,17 @@ def notes(obj: bpy.types.Object) -> list[str]:
     return found
 
 
-def warnings(obj: bpy.types.Object) -> list[str]:
-    """Returns a sentence for each downstream modifier that acts otherwise with Sinew than without."""
-    return [phrase(text, name=modifier.name) for modifier in _changed(obj) if (text := _warning(modifier))]
+def warnings(obj: bpy.types.Object, now: layout.Layout | None = None) -> list[str]:
+    """Returns a sentence for each downstream modifier that acts otherwise with Sinew than without.
+
+    now  its layout; None to read it
+    """
+    changed = _changed(obj, now or layout.read(obj))
+    return [phrase(text, name=modifier.name) for modifier in changed if (text := _warning(modifier))]
 
 
-def _changed(obj: bpy.types.Object) -> Iterator[bpy.types.Modifier]:
+def _changed(obj: bpy.types.Object, now: layout.Layout) -> Iterator[bpy.types.Modifier]:
     """Yields the downstream modifiers in front of which Sinew's is the first that does more than deform."""
-    now = layout.read(obj)
     if any(each.is_on and each.kind not in ONLY_DEFORM for each in now.ahead):
         return
     for each in now.behind:

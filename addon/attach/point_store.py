@@ -18,28 +18,30 @@ from . import (
     properties,
     property_groups,
     references,
-    stack,
     undeformed,
     upstream_proxy,
 )
+from .layout import Layout
 from .subscribers import notify, subscribers
 
 ATTRIBUTE, NORMALS_ATTRIBUTE = f"{node_group.OWN}points", f"{node_group.OWN}normals"
 
 
-def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders: bool = True) -> None:
+def ensure(obj: bpy.types.Object, now: Layout, in_buffer: bool, normals: str, in_renders: bool) -> Layout:
     """Makes the attribute or the point buffer for an object's points, and has Sinew's modifier read it.
+    Returns the layout after that.
 
+    now         its layout
     normals     the domain of the normals that are stored with them, POINT or CORNER; empty for none
     in_renders  normals are given in renders, too
 
     Raises SinewError where the modifiers before Sinew cannot be evaluated separately.
     """
-    nodes = stack.sinew_modifier(obj)
+    nodes = obj.modifiers[now.sinew]
     if in_buffer:
         if properties.of(obj).storage.attribute:
             remove_attributes(obj)
-        made = upstream_proxy.ensure(obj)
+        made = upstream_proxy.ensure(obj, now)
         kind, inputs = node_group.POINT_BUFFER, {"Points": point_buffer.ensure(obj), "Upstream": made}
     else:
         upstream_proxy.remove(obj)
@@ -51,7 +53,8 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
             inputs[node_group.NORMALS] = normals_name(attribute)
     if normals:
         inputs[node_group.IN_RENDERS] = in_renders
-    inputs |= undeformed.ensure(obj)
+    now, more = undeformed.ensure(obj, now)
+    inputs |= more
     made_by_features = notify(subscribers.node_group, obj)
     group = next(filter(None, made_by_features), None) or node_group.get_or_make(kind, normals)
     if nodes.node_group != group:
@@ -61,6 +64,7 @@ def ensure(obj: bpy.types.Object, in_buffer: bool, normals: str = "", in_renders
         nodes.node_group = group
         node_group.remove_unused()
     node_group.set_inputs(nodes, inputs)
+    return now
 
 
 def _ensure_attribute(obj: bpy.types.Object) -> str:

@@ -104,15 +104,6 @@ def _setting(kind: Callable, update: Callable = _method_changed, **settings: obj
 BY_SINEW, SKINNED_NORMALS, LEAVE_NORMALS = "BY_SINEW", "SKINNED", "LEAVE"
 
 
-def method_of_modifier(method: str, own: str, is_first: bool) -> str:
-    """Returns the method of one of an object's Armature modifiers; the first has the object's.
-
-    method  the object's
-    own     the one stored for the modifier
-    """
-    return method if is_first or own == SAME_METHOD else own
-
-
 class SinewReplacedModifier(bpy.types.PropertyGroup):
     """What Sinew stores about an Armature modifier that it replaces, called `name`."""
 
@@ -324,6 +315,12 @@ class SinewSettings(bpy.types.PropertyGroup):
     def replaces_modifiers(self) -> bool:
         """Whether Sinew deforms now, wherever the icons say so."""
         return self.stack.replaces_modifiers
+
+    @property
+    def methods(self) -> list[str]:
+        """That of each Armature modifier which Sinew replaces; the first has the object's."""
+        own = [replaced.method for replaced in self.replaced_modifiers]
+        return [self.method if n == 0 or name == SAME_METHOD else name for n, name in enumerate(own)]
 
     @property
     def mixed_method(self) -> str:

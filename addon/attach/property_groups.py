@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Copies, sets and clears the values of any group of properties."""
+"""Copies, sets and clears properties and groups of them."""
 
 from collections.abc import Iterable
 
@@ -38,10 +38,10 @@ def copy_groups(
             copy(getattr(source, name), getattr(target, name))
 
 
-def assign(group: bpy.types.PropertyGroup, name: str, value: object) -> None:
+def assign(struct: bpy.types.bpy_struct, name: str, value: object) -> None:
     """Assigns only a different value: each assignment makes Blender evaluate the object."""
-    if getattr(group, name) != value:
-        setattr(group, name, value)
+    if getattr(struct, name) != value:
+        setattr(struct, name, value)
 
 
 def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | float | str) -> None:

@@ -31,17 +31,15 @@ _OTHER_MESHES = {
 }
 
 
-def ensure(obj: bpy.types.Object) -> dict[str, object]:
-    """Makes the modifiers around Sinew's, and returns inputs of Sinew's."""
-    now = layout.read(obj)
+def ensure(obj: bpy.types.Object, now: layout.Layout) -> tuple[layout.Layout, dict[str, object]]:
+    """Makes the modifiers around Sinew's. Returns the layout after that, and inputs of Sinew's."""
     if not now.neutral and _can_make(obj):
         _make_neutral(obj)
     _ensure_mark(obj, now)
-    if not (now.neutral and now.mark):
-        now = layout.read(obj)
-    is_marked = can_mark(obj) and not loses_marks(obj, stack.position_own(obj, now))
+    now = stack.position_own(obj, now if now.neutral and now.mark else layout.read(obj))
+    is_marked = can_mark(obj) and not loses_marks(obj, now)
     keeps = properties.of(obj).before.adds_rest_position or not is_marked
-    return {
+    return now, {
         node_group.IS_MARKED: is_marked,
         node_group.MARK_TO_REMOVE: "" if keeps else node_group.REST_POSITION,
     }
@@ -129,11 +127,9 @@ def switch(obj: bpy.types.Object, now: layout.Layout, icon: str, is_on: bool, is
     is_clicked  Sinew's own modifier was switched, which they may follow
     """
     for modifier in (obj.modifiers[name] for name in now.helping):
-        # Setting an unchanged value makes Blender evaluate the object, too.
-        if getattr(modifier, icon) != is_on:
-            setattr(modifier, icon, is_on)
-            if not is_clicked:
-                _switched.add(obj.session_uid)
+        if getattr(modifier, icon) != is_on and not is_clicked:
+            _switched.add(obj.session_uid)
+        property_groups.assign(modifier, icon, is_on)
 
 
 def was_switched(obj: bpy.types.Object) -> bool:
@@ -149,8 +145,7 @@ def mark(obj: bpy.types.Object, is_marked: bool) -> None:
     own = adds_rest_position(obj)
     property_groups.store(before, "adds_rest_position", own)
     property_groups.store(before, "marks_rest", is_marked)
-    if obj.add_rest_position_attribute != (is_marked or own):
-        obj.add_rest_position_attribute = is_marked or own
+    property_groups.assign(obj, "add_rest_position_attribute", is_marked or own)
 
 
 def adds_rest_position(obj: bpy.types.Object) -> bool:

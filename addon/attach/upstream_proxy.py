@@ -51,9 +51,9 @@ _READERS = {"MULTIRES", "SKIN"}
 # from any copy.
 _shared: set[int] = set()
 
-# The session_uid of proxies that were made in the event that Sinew reacts to: their meshes are current until
-# Blender lists another change.
-just_made: set[int] = set()
+# Whether the copies were current when they were compared in this event, which takes long, by the session_uid
+# of their proxies.
+compared: dict[int, bool] = {}
 
 # Marks a proxy's own copy of the mesh.
 _COPY = "sinew_copy"
@@ -104,16 +104,16 @@ def check(obj: bpy.types.Object, now: Layout) -> None:
             )
 
 
-def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
-    """Returns the copy, made again where the upstream modifiers differ from its own, or set_outdated() said
-    that the mesh does: comparing meshes takes long."""
-    storage, now = properties.of(obj).storage, layout.read(obj)
+def ensure(obj: bpy.types.Object, now: Layout) -> bpy.types.Object | None:
+    """Returns the copy, made again where the upstream modifiers differ from its own, or the mesh does."""
+    storage = properties.of(obj).storage
     if not is_needed(obj, now):
         remove(obj)
         return None
     check(obj, now)
     wanted, shares, proxy = signature(obj, now), _has_to_share_mesh(obj, now), storage.upstream_proxy
-    if proxy is None or proxy.get(_MADE_FROM) != wanted or shares_mesh(obj) != shares:
+    is_made = proxy is not None and proxy.get(_MADE_FROM) == wanted and shares_mesh(obj) == shares
+    if not (is_made and is_current(obj)):
         # Never the old one with another mesh: see references.py.
         references.note(obj)
         remove(obj)
@@ -121,22 +121,9 @@ def ensure(obj: bpy.types.Object) -> bpy.types.Object | None:
         proxy[_MADE_FROM] = wanted
         if not shares and not mesh_compare.is_good_copy(obj.data, proxy.data):
             share_mesh(obj)
-            return ensure(obj)
-        just_made.add(proxy.session_uid)
+            return ensure(obj, now)
+        compared[proxy.session_uid] = True
     return storage.upstream_proxy
-
-
-def was_just_made(obj: bpy.types.Object) -> bool:
-    """Whether its proxy was made in the event that Sinew reacts to."""
-    proxy = properties.of(obj).storage.upstream_proxy
-    return proxy is not None and proxy.session_uid in just_made
-
-
-def set_outdated(obj: bpy.types.Object) -> None:
-    """Has ensure() make the copy again."""
-    proxy = properties.of(obj).storage.upstream_proxy
-    if proxy is not None:
-        proxy[_MADE_FROM] = ""
 
 
 def shares_mesh(obj: bpy.types.Object) -> bool:
@@ -171,10 +158,20 @@ def is_current(obj: bpy.types.Object) -> bool:
     proxy = properties.of(obj).storage.upstream_proxy
     if proxy is None or proxy.data == obj.data:
         return True
-    # Blender renames groups along with bones only where an Armature modifier has these.
-    has_same_groups = proxy.vertex_groups.keys() == obj.vertex_groups.keys()
-    is_like = has_same_groups and _has_copy(proxy) and _follows_keys(obj, proxy)
-    return is_like and mesh_compare.are_alike(obj.data, proxy.data)
+    uid = proxy.session_uid
+    if uid not in compared:
+        # Blender renames groups along with bones only where an Armature modifier has these.
+        has_same_groups = proxy.vertex_groups.keys() == obj.vertex_groups.keys()
+        is_like = has_same_groups and _has_copy(proxy) and _follows_keys(obj, proxy)
+        compared[uid] = is_like and mesh_compare.are_alike(obj.data, proxy.data)
+    return compared[uid]
+
+
+def compare_again(obj: bpy.types.Object) -> None:
+    """Called where its mesh may have changed within this event."""
+    proxy = properties.of(obj).storage.upstream_proxy
+    if proxy is not None:
+        compared.pop(proxy.session_uid, None)
 
 
 def _follows_keys(obj: bpy.types.Object, proxy: bpy.types.Object) -> bool:
@@ -194,6 +191,7 @@ def follow_points(obj: bpy.types.Object) -> None:
     proxy = properties.of(obj).storage.upstream_proxy
     if _has_copy(proxy):
         mesh_compare.write_points(obj.data, proxy.data)
+        compare_again(obj)
 
 
 def _has_copy(proxy: bpy.types.Object | None) -> bool:

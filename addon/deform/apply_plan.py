@@ -1,33 +1,26 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Applies a plan to an object: its modifiers, their armature pointers, and the storage of its points."""
 
-import logging
 from dataclasses import replace
 
 import bpy
-import numpy as np
 
 from ..attach import (
     attach,
     layout,
-    node_group,
     normals,
     point_store,
     pose_driver,
     properties,
-    property_groups,
     stack,
     upstream_proxy,
 )
-from ..attach.icons import VIEWS, Deformer
+from ..attach.icons import Deformer
 from ..attach.layout import Layout
-from ..base.errors import SinewError
 from ..io import armature_io
 from . import safe_mode, small_meshes
 from .bound import Bound
 from .plan import ARMATURE_MODIFIER_MODES, ObjectFacts, Plan, State
-
-log = logging.getLogger("sinew")
 
 
 def first_facts(obj: bpy.types.Object, now: Layout, error: str) -> ObjectFacts:
@@ -36,17 +29,14 @@ def first_facts(obj: bpy.types.Object, now: Layout, error: str) -> ObjectFacts:
     now    its layout
     error  why Sinew can not deform it; empty where it can
     """
-    settings, is_linked = properties.of(obj), obj.library is not None
     if attach.is_off(obj):
         return ObjectFacts(enabled=False)
-    if not is_linked and attach.follow_own_icons(obj, now):
-        now = layout.read(obj)
     viewport, render = now.icons
     is_by_sinew = viewport.deformer is render.deformer is Deformer.SINEW
     return ObjectFacts(
-        enabled=settings.enabled,
+        enabled=properties.of(obj).enabled,
         error=error,
-        is_linked=is_linked,
+        is_linked=obj.library is not None,
         mode=mode_of(obj),
         has_upstream=upstream_proxy.is_needed(obj, now),
         visibility_is_keyed=now.is_visibility_keyed,
@@ -58,21 +48,18 @@ def first_facts(obj: bpy.types.Object, now: Layout, error: str) -> ObjectFacts:
     )
 
 
-def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) -> ObjectFacts:
+def all_facts(obj: bpy.types.Object, now: Layout, failure: str, lacks: str) -> ObjectFacts:
     """Returns all facts of an object that is read.
 
-    now        its layout
-    failure    the error when Sinew deformed it within Blender's evaluation
-    waits_for  what its method needs and is not computed yet
+    now      its layout
+    failure  the error when Sinew deformed it within Blender's evaluation
+    lacks    what its method needs and is not computed yet
     """
     settings, mesh = properties.of(obj), obj.data
-    gives_normals = normals.are_given(settings)
-    domain = normals.domain_of(mesh) if gives_normals else ""
-    obstacle = normals.obstacle(obj, now) if domain else ""
-    given = normals.kind_of(mesh, "" if obstacle else domain)
+    given, reason = normals.given(obj, now)
     return replace(
         first_facts(obj, now, error=""),
-        builtin_is_faster=small_meshes.is_builtin_faster(obj, now, given),
+        builtin_is_faster=small_meshes.is_builtin_faster(obj, now, normals.kind_of(mesh, given.domain)),
         upstream_changes_weights=upstream_proxy.changes_weights(now),
         mesh_is_shared=mesh.users - mesh.use_fake_user > 1,
         mesh_is_editable=mesh.is_editable,
@@ -80,17 +67,17 @@ def all_facts(obj: bpy.types.Object, now: Layout, failure: str, waits_for: str) 
         has_heat_map=settings.heat,
         safe_mode=safe_mode.is_on(),
         failure=failure,
-        waits_for=waits_for,
-        gives_normals=gives_normals,
-        skins_normals=settings.normals == properties.SKINNED_NORMALS,
-        normals_domain=domain,
-        normals_obstacle=obstacle,
-        normals_for_viewport_alone=bool(domain) and normals.is_for_viewport_alone(now),
+        lacks=lacks,
+        normals=given,
+        normals_reason=reason,
     )
 
 
-def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
-    """Raises SinewError where the modifiers before Sinew cannot be evaluated separately."""
+def apply(obj: bpy.types.Object, now: Layout, old: Plan, wanted: Plan) -> None:
+    """now: the object's layout
+
+    Raises SinewError where the modifiers before Sinew cannot be evaluated separately.
+    """
     if obj.library is not None:
         # Its own file was saved so that its Armature modifier deforms it.
         return
@@ -103,10 +90,10 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
             if is_given_up:
                 # It was saved while it was on, and Sinew has not deformed it since it was appended.
                 attach.restore_volume(obj)
-            stack.position_own(obj, layout.read(obj))
+            stack.position_own(obj, now)
             return
-        attach.switch(obj, on=False)
-        attach.adopt_pointers(obj, stack.position_own(obj, layout.read(obj)))
+        attach.switch(obj, on=False, now=now)
+        attach.adopt_pointers(obj, stack.position_own(obj, now))
         if is_given_up:
             point_store.remove_point_attributes(obj)
             upstream_proxy.remove(obj)
@@ -118,10 +105,10 @@ def apply(obj: bpy.types.Object, old: Plan, wanted: Plan) -> None:
         else:
             attach.restore_volume(obj)
         return
-    given = wanted.normals
-    point_store.ensure(obj, wanted.in_buffer, given.domain, not given.are_for_viewport_alone)
-    attach.switch(obj, on=True, in_depsgraph=wanted.is_in_depsgraph)
-    attach.restore_pointers(obj, layout.read(obj))
+    given, in_renders = wanted.normals.domain, not wanted.normals.are_for_viewport_alone
+    now = point_store.ensure(obj, now, wanted.in_buffer, given, in_renders)
+    attach.switch(obj, True, wanted.is_in_depsgraph, now)
+    attach.restore_pointers(obj, now)
 
 
 def apply_driver(obj: bpy.types.Object, now: Layout, bound: Bound, wanted: Plan) -> None:
@@ -164,99 +151,3 @@ def apply_resumed(obj: bpy.types.Object, was_on: bool) -> None:
 def mode_of(obj: bpy.types.Object) -> str:
     """Returns its mode. Edit mode counts also where another object with the same mesh is in it."""
     return "EDIT" if obj.data.is_editmode else obj.mode
-
-
-def has_lost_modifier(obj: bpy.types.Object, now: Layout, plan: Plan) -> bool:
-    """Whether Sinew's modifier is gone, or the Armature modifier that deforms in its place."""
-    if obj.data.is_editmode:
-        return False
-    if not now.sinew:
-        return True
-    # Where Sinew deforms, or an error says that it is gone, the object stays.
-    stays = properties.of(obj).replaces_modifiers or plan.state is State.REFUSED
-    return not (stays or now.replaced)
-
-
-def follow_removal(obj: bpy.types.Object, rest: np.ndarray | None, shown: np.ndarray | None) -> None:
-    """Takes Sinew off an object that has lost its modifier.
-
-    If the modifier was applied or the object converted to a mesh, the mesh has the deformed shape: then the
-    replaced Armature modifiers are removed too. If the modifier was deleted, they deform the mesh again.
-
-    rest, shown  float32 [vertices, 3], the points as bound, and the last shape; None where unknown
-    """
-    if point_store.are_applied(obj, rest, shown):
-        applied = [modifier.name for modifier in stack.armature_modifiers(obj)]
-        attach.take_off(obj, is_by_others=True)
-        for name in applied:
-            obj.modifiers.remove(obj.modifiers[name])
-        log.info("%s: its shape is in its mesh now, and Sinew is off it", obj.name)
-    else:
-        attach.take_off(obj, is_by_others=True)
-        log.info("%s: its modifier was deleted, and Sinew is off it", obj.name)
-
-
-def adopt_copied_modifier(obj: bpy.types.Object) -> bool:
-    """Handles Sinew's modifier on an object without Sinew's settings, as Copy Modifiers leaves it. The object
-    gets Sinew as the original has it, or else only its Armature modifiers.
-
-    Returns whether there was such a modifier.
-    """
-    now = layout.read(obj)
-    if not now.sinew:
-        return False
-    armatures = [obj.modifiers[m.name] for m in now.modifiers if m.armature is not None]
-    origin = _origin_of(obj.modifiers[now.sinew], armatures)
-    for name in now.own:
-        obj.modifiers.remove(obj.modifiers[name])
-    kept = properties.of(origin).replaced_modifiers if origin is not None else {}
-    for modifier in armatures:
-        replaced = kept.get(modifier.name)
-        if replaced is None:
-            continue
-        if modifier.object is None:
-            modifier.object = replaced.armature
-    if origin is None or attach.armature_of(obj) is None:
-        return True
-    try:
-        attach.add(obj, properties.of(origin).method, is_shown=False)
-    except SinewError as error:
-        log.error("%s", error)
-        return True
-    settings, others = properties.of(obj), properties.of(origin)
-    properties.share(origin, obj)
-    property_groups.copy(others.before.smooth, settings.before.smooth)
-    for name, icons in zip(VIEWS, layout.read(origin).icons, strict=True):
-        property_groups.store(settings.stack, f"show_{name}", icons.sinew)
-    for replaced in settings.replaced_modifiers:
-        replaced.was_off = replaced.name in kept and kept[replaced.name].was_off
-    for replaced in list(settings.replaced_modifiers)[1:]:
-        replaced.method = kept[replaced.name].method if replaced.name in kept else properties.SAME_METHOD
-    return True
-
-
-def _origin_of(
-    nodes: bpy.types.NodesModifier, armatures: list[bpy.types.ArmatureModifier]
-) -> bpy.types.Object | None:
-    """Returns the skinned object that the modifiers were copied from: the one whose point buffer they name;
-    else the active one, which Blender's commands copy from; else one with modifiers of the same names and
-    armatures."""
-    names = {modifier.name for modifier in armatures}
-    alike = [
-        obj
-        for obj in bpy.data.objects
-        if properties.has_sinew(obj)
-        and names >= {each.name for each in properties.of(obj).replaced_modifiers}
-    ]
-    buffer = node_group.get_input(nodes, "Points")
-    pointed = {modifier.object for modifier in armatures} - {None}
-
-    def likeness(obj: bpy.types.Object) -> tuple[bool, bool, bool]:
-        settings = properties.of(obj)
-        return (
-            settings.storage.point_buffer is not None and settings.storage.point_buffer == buffer,
-            obj == bpy.context.view_layer.objects.active,
-            pointed <= set(settings.armatures),
-        )
-
-    return max(alike, key=likeness, default=None)

@@ -20,18 +20,19 @@ from ..io.actions import animated_paths
 from ..skinning import sdef
 from ..skinning.arrays import are_equal
 from ..skinning.rig import Bones, RigFacts, Weighting
+from ..skinning.shading import GivenNormals
 from ..skinning.skin_stack import ModifierSkin, SkinDeformer, SkinStack
 from ..skinning.stage_mesh import StageMesh
 from ..skinning.stages import StagesAfter
 from ..skinning.vertex_data import VertexData
 from . import source, survey
-from .plan import Normals
 from .source import Source
 
 
 @dataclass(frozen=True)
 class Bound:
-    """Immutable: it is replaced where any of it may be out of date.
+    """It is replaced where any of it may be out of date; one that is bound to the same modifiers, bones and
+    weights keeps the skin stack, with what that has computed.
 
     armatures   the session_uid of each Armature modifier's armature, 0 for none
     options     of each Armature modifier
@@ -51,6 +52,16 @@ class Bound:
     def is_of_another_stack(self, other: Bound | None) -> bool:
         """Whether modifiers, bones or weights differ from the other's: more than the rest points."""
         return other is None or self.skin_stack is not other.skin_stack
+
+    def take_over(self, old: Bound) -> None:
+        """Has the skin stack, if it is the old one's, work with the surface that was read since. Called under
+        the lock of what deforms by it."""
+        if self.is_of_another_stack(old):
+            return
+        skins = self.skin_stack.skins
+        for skin in () if self.source.has_same_surface(old.source) else skins:
+            skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, self.source, skin)
+        self.skin_stack.set_stage_mesh(_stage_mesh(self.source, skins))
 
     @property
     def data_versions(self) -> list[int]:
@@ -77,7 +88,7 @@ class Bound:
         ]
 
     def write_normals(
-        self, points: np.ndarray, rest_points: np.ndarray, given: Normals, out: np.ndarray
+        self, points: np.ndarray, rest_points: np.ndarray, given: GivenNormals, out: np.ndarray
     ) -> None:
         """Computes the normals that belong to the points.
 
@@ -106,7 +117,8 @@ class Bound:
 def read(
     obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, now: Layout, old: Bound | None = None
 ) -> Bound:
-    """Reads the object. Binds again only what has changed; returns the same skin stack where nothing has.
+    """Reads the object. Binds again only what has changed; the skin stack is the old one where modifiers,
+    bones and weights have not.
 
     now  the object's layout
     old  given where neither modifiers nor their options changed since
@@ -121,10 +133,6 @@ def read(
         read_now.take_what_equals(old.source)
     spaces_now = [_bones_from_model(obj, replaced.armature, depsgraph) for _modifier, replaced in pairs]
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones, spaces_now):
-        if not read_now.has_same_surface(old.source):
-            for skin in old.skin_stack.skins:
-                skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
-        old.skin_stack.set_stage_mesh(_stage_mesh(read_now, old.skin_stack.skins))
         return replace(old, source=read_now)
     options = _options_of(obj, now, depsgraph)
     masks = _masks(read_now, groups)
@@ -144,7 +152,7 @@ def read(
             ModifierSkin(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
         )
     weighting = skins[0].deformer.weighting
-    facts = survey.describe(obj, pairs[0][1].armature, weighting, read_now.points, depsgraph)
+    facts = survey.describe(obj, now, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
     skin_stack = SkinStack(skins, StagesAfter(_stage_mesh(read_now, skins), masks))
     return Bound(armatures, options, read_now, skin_stack, facts, groups)
@@ -169,8 +177,6 @@ def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bou
     """
     read_now = source.with_surface(obj, depsgraph, old.source)
     read_now.keep_normals_of(old.source)
-    for skin in old.skin_stack.skins:
-        skin.deformer.vertex_data = _vertex_data(skin.deformer.weighting, read_now, skin)
     return replace(old, source=read_now)
 
 
@@ -212,7 +218,7 @@ def _equals_but_for_points(
     known = [skin.deformer.weighting for skin in old.skin_stack.skins]
     # Where a bone is the mesh's parent, poses move its space: the one in which it was bound decides.
     has_same_skin = are_equal(read_now.surface_points, old.source.surface_points)
-    return read_now.equals_but_for_points(old.source) and all(
+    return read_now.has_same_weights(old.source) and all(
         now.equals(before.bones) and (has_same_skin or _has_same_limbs(before, read_now, space))
         for now, before, space in zip(bones, known, spaces_now, strict=False)
     )
@@ -259,9 +265,8 @@ def _read_bones(armature: bpy.types.Object | None, depsgraph: bpy.types.Depsgrap
 def methods_of(obj: bpy.types.Object) -> list[str]:
     """Returns the methods that its settings name now, each once."""
     settings = properties.of(obj)
-    own = (replaced.method for replaced in list(settings.replaced_modifiers)[1:])
-    named = [settings.method, settings.mixed_method, *own]
-    return [name for name in dict.fromkeys(named) if name in METHODS]
+    named = dict.fromkeys([settings.method, settings.mixed_method, *settings.methods])
+    return [name for name in named if name in METHODS]
 
 
 def is_method_animated(obj: bpy.types.Object) -> bool:

@@ -36,32 +36,25 @@ def _take_off_drivers_without_modifier() -> None:
     with updates_suspended() as may_react:
         if not (may_react and may_change_file()):
             return
-        for obj, state in current.pairs:
-            with contextlib.suppress(ReferenceError):
-                is_missing = state.plan.is_in_depsgraph and state.noted.layout.sinew not in obj.modifiers
-                # The modifier may have been renamed.
-                if is_missing and obj.is_editable and stack.sinew_modifier(obj) is None:
-                    pose_driver.remove(obj)
+        for obj, skinned in session.living_pairs():
+            is_missing = skinned.plan.is_in_depsgraph and skinned.noted.layout.sinew not in obj.modifiers
+            # The modifier may have been renamed.
+            if is_missing and obj.is_editable and stack.sinew_modifier(obj) is None:
+                pose_driver.remove(obj)
 
 
 @persistent
 def on_depsgraph_update(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> None:
-    if not _was_only_posed(depsgraph):
-        notify(subscribers.evaluated, depsgraph)
-
-
-def _was_only_posed(depsgraph: bpy.types.Depsgraph) -> bool:
-    """Reacts to an update. Returns whether nothing had to be done, as it only posed what Sinew deforms."""
+    is_posed, unshown = False, None
     with updates_suspended() as may_react:
-        if current.is_idle:
-            return False
-        original, waiting = finder("depsgraph_update_post", on_depsgraph_update), None
-        is_posed = may_react and may_change_file() and session.were_only_posed(depsgraph, original)
-        if not is_posed:
-            waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
-    _end_event(depsgraph, waiting)
-    _note_seen("depsgraph_update_post", depsgraph)
-    return is_posed
+        if not current.is_idle:
+            original = finder("depsgraph_update_post", on_depsgraph_update)
+            is_posed = may_react and may_change_file() and session.were_only_posed(depsgraph, original)
+            if not is_posed:
+                unshown = _react(depsgraph, _read_changes(depsgraph, original, frame=False), may_react)
+    _end_event("depsgraph_update_post", depsgraph, unshown)
+    if not is_posed:
+        notify(subscribers.evaluated, depsgraph)
 
 
 @persistent
@@ -79,26 +72,25 @@ def on_frame_change(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> 
     if current.all_use_builtin and Changes.are_motion_only(depsgraph):
         notify(subscribers.frame_shown)
         return
-    waiting = None
+    unshown = None
     with updates_suspended() as may_react:
         if not current.is_idle:
             original = finder("frame_change_post", on_frame_change)
             if not session.were_all_deformed(depsgraph, original):
-                waiting = _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
+                unshown = _react(depsgraph, _read_changes(depsgraph, original, frame=True), may_react)
         if depsgraph.scene.rigidbody_world is not None and may_react and may_change_file():
             rigid_bodies.make_again(depsgraph.scene, (obj for obj, _state in current.pairs))
-    _end_event(depsgraph, waiting)
-    _note_seen("frame_change_post", depsgraph)
+    _end_event("frame_change_post", depsgraph, unshown)
 
 
 def _begin_evaluation() -> None:
     is_renamed = False
-    for obj, state in current.pairs:
-        evaluation = state.evaluation
-        evaluation.mesh, evaluation.is_event_known, evaluation.was_tagged = 0, True, False
+    for obj, skinned in current.pairs:
+        evaluation = skinned.evaluation
+        evaluation.given = set()
         try:
-            evaluation.is_only_user = state.noted.mesh_users == obj.data.users
-            is_renamed |= state.noted.name != obj.name
+            evaluation.is_only_user = skinned.noted.own.mesh_users == obj.data.users
+            is_renamed |= skinned.noted.name != obj.name
         except ReferenceError:
             # The object was deleted since the list was made.
             evaluation.is_only_user = False
@@ -106,20 +98,21 @@ def _begin_evaluation() -> None:
         session.name_requests()
 
 
-def _end_event(depsgraph: bpy.types.Depsgraph, waiting: Changes | None) -> None:
-    """Whatever Blender evaluates from here to the next event is caused by a handler that changed something.
+def _end_event(event: str, depsgraph: bpy.types.Depsgraph, unshown: Changes | None) -> None:
+    """Called at the end of each reaction.
 
-    waiting  as from _react()
+    event    after whose reaction functions behind Sinew's may be called; empty at their own
+    unshown  as from _react()
     """
-    if waiting is not None:
-        _keep_evaluated_shapes(waiting)
+    if unshown is not None:
+        _keep_evaluated_shapes(unshown)
         # No window need show it.
         with bpy.context.temp_override(scene=depsgraph.scene, view_layer=depsgraph.view_layer):
             session.refresh_between_steps(bpy.context)
-    upstream_proxy.just_made.clear()
-    for _obj, state in current.pairs:
-        state.evaluation.is_event_known = state.evaluation.was_tagged
+    upstream_proxy.compared.clear()
     session.note_shown(depsgraph)
+    is_followed = bool(event) and events.is_last(event, _LAST[-1])
+    current.seen = names_of_changed_meshes(depsgraph) if is_followed else None
 
 
 def _read_changes(depsgraph: bpy.types.Depsgraph, original: Find, frame: bool) -> Changes:
@@ -135,7 +128,7 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
     saving (others' changes may be in the same list), and for the window during a render: points written after
     the update would then belong to the render's frame.
 
-    Returns the changes where an object waits for another evaluation."""
+    Returns the changes where an object gets its shape only with another evaluation."""
     waits_for_render = is_rendering_in_window() and is_main_thread()
     phase.must_refresh |= waits_for_render
     if not may_react or phase.is_saving or waits_for_render:
@@ -146,10 +139,11 @@ def _react(depsgraph: bpy.types.Depsgraph, changes: Changes, may_react: bool) ->
         return None
     with references.between_steps():
         session.update_all(depsgraph, changes)
-    before, current.waiting = current.waiting, session.waiting()
+    before, current.without_upstream = current.without_upstream, session.without_upstream()
     # What handlers change, Blender evaluates without an event. Once for each upstream proxy: one in another
     # scene goes on waiting.
-    return changes if current.waiting - before and depsgraph == depsgraph.view_layer.depsgraph else None
+    is_new = bool(current.without_upstream - before)
+    return changes if is_new and depsgraph == depsgraph.view_layer.depsgraph else None
 
 
 def _keep_evaluated_shapes(changes: Changes) -> None:
@@ -170,19 +164,14 @@ def _subscribe_behind_others(event: str, function: Callable) -> None:
     if current.seen is not None or events.is_last(event, function):
         return
     are_there = events.is_last(event, _LAST[-1])
-    are_needed = bool(current.objects) and events.others_follow(event, function)
+    # After an undo step, the objects have to be found again.
+    are_needed = current.objects != [] and events.others_follow(event, function)
     if are_there == are_needed:
         return
     for each in _LAST:
         events.unsubscribe(event, each)
         if are_needed:
             events.subscribe(event, each)
-
-
-def _note_seen(event: str, depsgraph: bpy.types.Depsgraph) -> None:
-    """Called at the end of Sinew's own reaction to an event."""
-    are_called = events.is_last(event, _LAST[-1])
-    current.seen = names_of_changed_meshes(depsgraph) if are_called else None
 
 
 @persistent
@@ -196,35 +185,34 @@ def after_others(_scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -> Non
     seen, current.seen = current.seen, None
     if seen is None:
         return
-    names, new, waiting = names_of_changed_meshes(depsgraph), Changes(complete=True), None
+    names, new, unshown = names_of_changed_meshes(depsgraph), Changes(complete=True), None
     with updates_suspended() as may_react:
         unread = []
-        for obj, state in current.pairs:
-            with contextlib.suppress(ReferenceError):
-                if not state.is_as_noted(obj, layout.read(obj)):
-                    # For example its modifiers, which decide who computes its normals.
-                    new.objects.add(obj.session_uid)
-                if obj.data.name_full not in names:
-                    continue
-                if obj.data.name_full in seen or properties.of(obj).storage.upstream_proxy is not None:
-                    unread.append(obj)
-                    if not upstream_proxy.is_current(obj):
-                        upstream_proxy.follow_points(obj)
-                else:
-                    new.meshes.add(obj.data.session_uid)
+        for obj, skinned in session.living_pairs():
+            if not skinned.is_as_noted(obj, layout.read(obj)):
+                # For example its modifiers, which decide who computes its normals.
+                new.objects.add(obj.session_uid)
+            if obj.data.name_full not in names:
+                continue
+            if obj.data.name_full in seen or properties.of(obj).storage.upstream_proxy is not None:
+                unread.append(obj)
+                if not upstream_proxy.is_current(obj):
+                    upstream_proxy.follow_points(obj)
+            else:
+                new.meshes.add(obj.data.session_uid)
         if new.meshes or new.objects:
             new.touched |= new.meshes | new.objects
             # Sinew's own changes came before these handlers.
             current.expected -= new.meshes
-            waiting = _react(depsgraph, new, may_react)
+            unshown = _react(depsgraph, new, may_react)
         for obj in unread:
             with contextlib.suppress(ReferenceError):
-                state = session.state_of(obj)
-                if state is not None:
-                    state.needs_recheck = True
+                skinned = session.skinned_of(obj)
+                if skinned is not None:
+                    skinned.needs_recheck = True
                     # The upstream proxy is evaluated again only now.
-                    state.evaluation.changed_unannounced |= obj.data.name_full not in seen
-    _end_event(depsgraph, waiting)
+                    skinned.evaluation.changed_unannounced |= obj.data.name_full not in seen
+    _end_event("", depsgraph, unshown)
 
 
 @persistent
@@ -235,7 +223,7 @@ def after_others_again(scene: bpy.types.Scene, depsgraph: bpy.types.Depsgraph) -
 def check_unannounced() -> float:
     """Timer of a window for what Blender evaluates without an event: what another add-on's handler changed
     behind Sinew's, and a view layer that is shown for the first time."""
-    if any(state.evaluation.changed_unannounced for _obj, state in current.pairs):
+    if any(skinned.evaluation.changed_unannounced for _obj, skinned in current.pairs):
         session.refresh_between_steps(bpy.context)
     if session.needs_first_evaluations():
         for window in bpy.context.window_manager.windows:

@@ -14,14 +14,13 @@ import numpy as np
 import sinew
 
 from ..attach import point_store, properties
-from ..attach.icons import VIEWS, Deformer, Icons
+from ..attach.icons import ICONS, Deformer, Icons
 from ..attach.layout import is_deforming_body
 from ..attach.modifier_options import ModifierOptions
 from ..io import mesh_io
 from ..io.actions import animated_paths
 from . import pose, source
-from .plan import State
-from .skinned_object import Shown, SkinnedObject
+from .skinned_object import LeftOut, Shown, SkinnedObject
 
 # How many evaluated copies of an object are remembered.
 _MAX_COPIES = 32
@@ -64,7 +63,8 @@ class DepsgraphRequests:
             deform(evaluated, evaluated_mesh, skinned)
         except Exception as error:
             # The handlers deal with it, and the panel shows it.
-            skinned.evaluation.fail(error)
+            skinned.evaluation.given.discard(evaluated_mesh.as_pointer())
+            skinned.fail(error)
 
 
 def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> None:
@@ -77,7 +77,8 @@ def deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedOb
     with skinned.lock:
         reason = _deform(evaluated, mesh, skinned)
         if reason:
-            skinned.evaluation.skip_reason, skinned.evaluation.mesh = reason, 0
+            skinned.evaluation.skip_reason = reason
+            skinned.evaluation.given.discard(mesh.as_pointer())
 
 
 def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedObject) -> str:
@@ -104,10 +105,9 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         return "its mesh changed"
     evaluation = skinned.evaluation
     icons = pose.icons_of(evaluated, modifiers, skinned)
-    is_for_viewports = evaluation.mesh_shown == mesh.as_pointer()
+    is_for_viewports = skinned.viewport_mesh == mesh.as_pointer()
     _leave_out(evaluated, modifiers if is_for_viewports and skinned.plan.leaves_out else [], skinned, icons)
     out, normals = memory
-    _note_unannounced_change(out, skinned)
     frames = pose.read(evaluated, settings, modifiers, skinned, icons)
     rest_points = source.evaluated_points(evaluated, mesh, bound.source)
     if rest_points is None:
@@ -118,11 +118,12 @@ def _deform(evaluated: bpy.types.Object, mesh: bpy.types.Mesh, skinned: SkinnedO
         bound.write_normals(out, rest_points, skinned.plan.normals, normals)
     if skinned.plan.in_buffer:
         point_store.mark_as_written(out, bound.source.points)
-    evaluation.mesh, evaluation.skip_reason, evaluation.failures_in_a_row = mesh.as_pointer(), "", 0
+    evaluation.given.add(mesh.as_pointer())
+    evaluation.skip_reason, skinned.failures.in_a_row = "", 0
     number, taken = skinned.shown.number + 1, 1000.0 * (time.perf_counter() - started)
-    skinned.shown = Shown(frames, rest_points, values, out[0].tobytes(), number, taken)
+    skinned.shown = Shown(frames, rest_points, values, number, taken)
     # An animation can choose a method whose data has not been requested yet.
-    is_new_need = skinned.plan.state is not State.WAITING and pose.lacks_data(bound, frames)
+    is_new_need = not skinned.plan.lacks and pose.lacks_data(bound, frames)
     return "what its method needs is not computed" if is_new_need else ""
 
 
@@ -137,40 +138,30 @@ def _leave_out(
     """
     stack_now, known = evaluated.modifiers, skinned.noted.layout
     left_out = {replaced.name for replaced, _armature in modifiers}
-    copy = evaluated.as_pointer()
-    # Of a copy that is marked, the address is known.
-    if stack_now[known.sinew].show_in_editmode and skinned.evaluation.left_out.get(copy) == left_out:
+    copy, is_marked = evaluated.as_pointer(), stack_now[known.sinew].show_in_editmode
+    if is_marked and copy in skinned.left_out and skinned.left_out[copy].modifiers == left_out:
         return
     names = map(bpy.utils.escape_identifier, (*known.own, *known.replaced))
     starts = tuple(f'modifiers["{name}"].show_' for name in names)
     if any(path.startswith(starts) for path in animated_paths(evaluated)):
         # An animation that was just added decides from now on.
         return
-    if len(skinned.evaluation.left_out) > _MAX_COPIES:
+    if len(skinned.left_out) > _MAX_COPIES:
         # Each frame of a render can have made one.
-        skinned.evaluation.left_out.clear()
-    skinned.evaluation.left_out[copy] = left_out
-    for view, of_view in zip(VIEWS, icons, strict=True):
+        skinned.left_out.clear()
+    skinned.left_out[copy] = LeftOut(left_out, icons)
+    for icon, of_view in zip(ICONS, icons, strict=True):
         is_by_sinew = of_view.deformer is Deformer.SINEW
         shown = [
             is_by_sinew
             if m.name in known.own
-            else getattr(m, f"show_{view}") and not (is_by_sinew and m.name in left_out)
+            else getattr(m, icon) and not (is_by_sinew and m.name in left_out)
             for m in stack_now
         ]
-        stack_now.foreach_set(f"show_{view}", shown)
+        stack_now.foreach_set(icon, shown)
     # A mark, which goes when Blender copies the icons from the original again (pose.icons_of).
     marked = [m.show_in_editmode or m.name == known.sinew for m in stack_now]
     stack_now.foreach_set("show_in_editmode", marked)
-
-
-def _note_unannounced_change(out: np.ndarray, skinned: SkinnedObject) -> None:
-    """Notes a mesh that another add-on's handler changed, for which there is no event: the evaluated mesh is
-    a new copy, without the points that were written last."""
-    evaluation, first_point = skinned.evaluation, skinned.shown.first_point
-    if not (evaluation.is_event_known or skinned.plan.in_buffer) and first_point is not None:
-        evaluation.changed_unannounced |= out[0].tobytes() != first_point
-        skinned.needs_recheck |= evaluation.changed_unannounced
 
 
 def _memory_to_write(
@@ -180,12 +171,10 @@ def _memory_to_write(
     or in the evaluated point buffer. None where it does not exist or has another size."""
     points, count = len(skinned.bound.source.points), skinned.normal_count
     if not skinned.plan.in_buffer:
-        to_points = mesh_io.vectors_in(mesh, skinned.noted.attribute)
-        to_normals = _NO_NORMALS
+        of_points, of_normals = skinned.noted.attributes
+        to_points, to_normals = mesh_io.vectors_in(mesh, of_points), _NO_NORMALS
         if count:
-            domain = skinned.plan.normals.domain
-            name = point_store.normals_name(skinned.noted.attribute)
-            to_normals = mesh_io.vectors_in(mesh, name, domain)
+            to_normals = mesh_io.vectors_in(mesh, of_normals, skinned.plan.normals.domain)
         if to_points is None or to_normals is None:
             return None
         return (to_points, to_normals) if (len(to_points), len(to_normals)) == (points, count) else None

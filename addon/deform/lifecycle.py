@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 import bpy
 from bpy.app.handlers import persistent
 
-from ..attach import note, overrides, point_store, properties, references, undeformed
+from ..attach import note, overrides, point_store, properties, references, undeformed, upstream_proxy
 from ..attach.feature import Feature
 from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, phase, updates_suspended
@@ -76,7 +76,7 @@ def on_loaded(*_args: object) -> None:
         overrides.restore()
         note.remove()
         notify(subscribers.loaded)
-        if not session.objects_with_sinew(Changes()):
+        if not session.objects_with_sinew():
             return
     # This is the file's first evaluation. Like the one that Blender would make, it has to be one of time,
     # too, or poses that differ from their keys would stay.
@@ -145,7 +145,7 @@ def prepare_for_save() -> None:
                 apply_plan.apply_saved(obj, session.plan_of(obj))
                 overrides.store(obj)
         with _logging_failure("What the methods need is not in the file, and is computed again"):
-            precomputing.store_in_meshes([(obj, session.state_of(obj)) for obj in objects])
+            precomputing.store_in_meshes([(obj, session.skinned_of(obj)) for obj in objects])
         with _logging_failure("The file does not say that it uses Sinew"):
             note.write([obj for obj in objects if properties.of(obj).before.has_nearest_volume])
 
@@ -196,13 +196,14 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
         session.current.objects = None
         depsgraph, changes = context.view_layer.depsgraph, Changes()
         had_sinew = depsgraph is not None and any(
-            properties.has_sinew(obj.evaluated_get(depsgraph)) for obj in session.objects_with_sinew(changes)
+            properties.has_sinew(obj.evaluated_get(depsgraph)) for obj in session.objects_with_sinew()
         )
         if depsgraph is None or had_sinew:
             depsgraph = context.evaluated_depsgraph_get()
         session.update_all(depsgraph, changes)
-        if session.waiting():
+        if session.without_upstream():
             session.update_all(context.evaluated_depsgraph_get(), changes)
+        upstream_proxy.compared.clear()
         prepare_for_save()
 
 
@@ -212,14 +213,14 @@ def changing_for_file(context: bpy.types.Context) -> Iterator[None]:
 @persistent
 def on_render_start(*_args: object) -> None:
     phase.is_rendering = True
-    precomputations.waits = True
+    precomputations.blocks = True
 
 
 @_handler
 def on_render_end(_may_react: bool) -> None:
     """Runs in the render's thread, if it has one: what waited for its end is left to the main thread."""
     phase.is_rendering = False
-    precomputations.waits = bpy.app.background
+    precomputations.blocks = bpy.app.background
     if not bpy.app.background and not bpy.app.timers.is_registered(_after_render):
         bpy.app.timers.register(_after_render, first_interval=0.05)
 
@@ -227,7 +228,7 @@ def on_render_end(_may_react: bool) -> None:
 def _after_render() -> float | None:
     if is_rendering_in_window():
         return 0.05
-    must_refresh = phase.must_refresh or any(state.needs_apply for state in session.current.skinned.values())
+    must_refresh = phase.must_refresh or any(skinned.needs_plan for _obj, skinned in session.current.pairs)
     phase.must_refresh = False
     if must_refresh:
         session.refresh_between_steps(bpy.context)

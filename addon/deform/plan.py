@@ -5,8 +5,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from enum import Enum
+from functools import cached_property
 
 from ..attach.icons import Deformer
+from ..skinning.shading import NO_NORMALS, GivenNormals
 
 # In these modes Blender's tools work through the Armature modifier, so it deforms the mesh meanwhile.
 ARMATURE_MODIFIER_MODES = frozenset({"EDIT", "SCULPT"})
@@ -20,28 +22,13 @@ class State(Enum):
     LINKED = "linked"  # the Armature modifier: the object belongs to another file
     EDITING = "editing"  # the Armature modifier: tools of the object's mode need it
     BUILT_IN = "built-in"  # the Armature modifier: it has the same shape in less time, or the mode needs it
-    WAITING_UPSTREAM = "waiting upstream"  # Sinew, once Blender has evaluated what it deforms
-    WAITING = "waiting"  # Sinew, with the Armature modifier's method until the chosen one's data is computed
+    WAITING = "waiting"  # Sinew, once Blender has evaluated what it deforms
     IN_DEPSGRAPH = "in depsgraph"  # Sinew, within Blender's evaluation: the usual case
     AFTER_UPDATE = "after update"  # Sinew, after the evaluation; Blender then evaluates once more
 
 
 # Nothing of the object is read then.
 _UNREAD = (State.OFF, State.REFUSED, State.LINKED, State.EDITING)
-
-
-@dataclass(frozen=True)
-class Normals:
-    """The normals that Sinew gives along with the points.
-
-    domain                  POINT or CORNER: the elements that have normals; empty where Blender computes them
-    are_skinned             skinned from the rest normals, not computed from the deformed surface
-    are_for_viewport_alone  in renders Blender computes them
-    """
-
-    domain: str = ""
-    are_skinned: bool = False
-    are_for_viewport_alone: bool = False
 
 
 _IN_BOTH = {
@@ -65,7 +52,8 @@ class Plan:
     reason          one clause for the panel; the error of REFUSED; empty for the usual case and for what the
                     user chose
     in_buffer       a separate object stores the points (point_buffer.py), not an attribute of the mesh
-    after_update    Sinew deforms after Blender's evaluation, not within it
+    lacks           what its method needs and is not computed yet, as a clause; meanwhile Sinew deforms it by
+                    the Armature modifier's method
     normals         the normals given along with the points
     normals_reason  why Blender computes the normals although the user wants Sinew to; a clause for the panel
     leaves_out      Blender leaves the Armature modifiers out while Sinew deforms within its evaluation:
@@ -77,8 +65,8 @@ class Plan:
     state: State
     reason: str = ""
     in_buffer: bool = False
-    after_update: bool = False
-    normals: Normals = Normals()
+    lacks: str = ""
+    normals: GivenNormals = NO_NORMALS
     normals_reason: str = ""
     leaves_out: bool = True
     viewport: Deformer = Deformer.SINEW
@@ -91,12 +79,12 @@ class Plan:
         is_same = self == replace(other, viewport=self.viewport, render=self.render)
         return is_same and (self.is_in_depsgraph or views == (other.viewport, other.render))
 
-    @property
+    @cached_property
     def uses_builtin(self) -> bool:
         """Whether Sinew does not deform it: its Armature modifiers do, where their icons are on."""
         return not self.is_read or self.state is State.BUILT_IN
 
-    @property
+    @cached_property
     def is_read(self) -> bool:
         """Whether mesh, weights and bones are read."""
         return self.state not in _UNREAD
@@ -110,19 +98,19 @@ class Plan:
         found = (_IN_VIEWPORT.get(self.viewport), _IN_RENDERS.get(self.render))
         return [sentence for sentence in found if sentence is not None]
 
-    @property
+    @cached_property
     def is_in_depsgraph(self) -> bool:
         """Whether Sinew deforms within Blender's evaluation."""
-        return not (self.uses_builtin or self.after_update)
+        return self.state is State.IN_DEPSGRAPH
 
-    @property
+    @cached_property
     def is_written(self) -> bool:
         """Whether Sinew deforms after it."""
-        return self.after_update and not self.uses_builtin
+        return self.state is State.AFTER_UPDATE
 
 
 # That of an object before its first evaluation.
-UNSEEN = Plan(State.WAITING_UPSTREAM)
+UNSEEN = Plan(State.WAITING)
 
 
 @dataclass(frozen=True)
@@ -146,13 +134,8 @@ class ObjectFacts:
                                 renders
     safe_mode                   nothing of Sinew may run within Blender's evaluation
     failure                     the error within Blender's evaluation; empty if there was none
-    waits_for                   what its method needs and is not computed yet, as a clause; empty if nothing
-    gives_normals               the user chose that Sinew computes normals
-    skins_normals               the user chose that normals are skinned
-    normals_domain              POINT or CORNER: the normals that draw the mesh; empty where Blender always
-                                computes them
-    normals_obstacle            why Blender has to compute the normals, as a clause; empty where it need not
-    normals_for_viewport_alone  a modifier that is on only in renders needs Blender's normals
+    lacks, normals, normals_reason
+                                those of the plan
     """
 
     enabled: bool = True
@@ -174,12 +157,9 @@ class ObjectFacts:
     views_differ: bool = False
     safe_mode: bool = False
     failure: str = ""
-    waits_for: str = ""
-    gives_normals: bool = False
-    skins_normals: bool = False
-    normals_domain: str = ""
-    normals_obstacle: str = ""
-    normals_for_viewport_alone: bool = False
+    lacks: str = ""
+    normals: GivenNormals = NO_NORMALS
+    normals_reason: str = ""
 
 
 def plan(facts: ObjectFacts) -> Plan:
@@ -205,33 +185,8 @@ def _plan(facts: ObjectFacts) -> Plan:
     reason = _why_not_in_depsgraph(facts)
     has_own_mesh = facts.mesh_is_editable and not facts.mesh_is_shared
     in_buffer = bool(reason) or facts.has_upstream or not has_own_mesh
-    normals, normals_reason = _normals(facts)
-    # The route does not change while it waits: afterwards only the method changes.
     state = State.AFTER_UPDATE if reason else State.IN_DEPSGRAPH
-    if facts.waits_for:
-        state = State.WAITING
-    return Plan(
-        state,
-        facts.waits_for or reason,
-        in_buffer,
-        bool(reason),
-        normals=normals,
-        normals_reason=normals_reason,
-    )
-
-
-def _normals(facts: ObjectFacts) -> tuple[Normals, str]:
-    """Returns Plan.normals and Plan.normals_reason."""
-    if not (facts.gives_normals and facts.normals_domain):
-        return Normals(), ""
-    reasons = (
-        (bool(facts.normals_obstacle), facts.normals_obstacle),
-        (facts.has_heat_map, "its heat map is shown"),
-    )
-    obstacle = next((reason for holds, reason in reasons if holds), "")
-    if obstacle:
-        return Normals(), obstacle
-    return Normals(facts.normals_domain, facts.skins_normals, facts.normals_for_viewport_alone), ""
+    return Plan(state, reason, in_buffer, facts.lacks, facts.normals, facts.normals_reason)
 
 
 def _why_not_in_depsgraph(facts: ObjectFacts) -> str:

@@ -7,7 +7,7 @@ import bpy
 import numpy as np
 
 from ..attach import attach, properties, stack, stage_settings
-from ..attach.icons import Deformer, Icons
+from ..attach.icons import ICONS, Deformer, Icons
 from ..attach.layout import method_of
 from ..base.errors import SinewError
 from ..io import armature_io, spaces
@@ -53,11 +53,9 @@ def read(
             f"methods are {', '.join(f'{m.number} {m.label}' for m in properties.METHODS.values())}"
         )
     frames: Frames = []
-    for skin, (replaced, armature), takes_part in zip(
-        skinned.bound.skin_stack.skins,
-        modifiers,
-        _taking_part(icons, mode),
-        strict=False,
+    parts = modifiers, settings.methods, _taking_part(icons, mode)
+    for skin, (replaced, armature), own, takes_part in zip(
+        skinned.bound.skin_stack.skins, *parts, strict=False
     ):
         if armature is None or armature.data.is_editmode or not takes_part:
             frames.append(None)
@@ -70,7 +68,6 @@ def read(
                 continue
         pose = _finite(armature_io.read_pose(armature, skin.deformer.bones), skin.deformer.bones)
         number = len(frames)
-        own = properties.method_of_modifier(method, replaced.method, is_first=number == 0)
         is_mixed = skin.deformer.mix_weights is not None and own == method
         if skinned.noted.volume_keyed[number] and own in attach.MODIFIERS_OWN:
             own = method_of(evaluated.modifiers[replaced.name])
@@ -160,15 +157,15 @@ def icons_of(
 ) -> tuple[Icons, Icons]:
     """Returns the icons in the viewport and in renders, as the artist or an animation set them."""
     own = evaluated.modifiers[skinned.noted.layout.sinew]
-    # Otherwise in_depsgraph.py has switched them since Blender copied them.
-    if not own.show_in_editmode or skinned.evaluation.icons is None:
-        replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
-        viewport, render = (
-            Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced))
-            for icon in ("show_viewport", "show_render")
-        )
-        skinned.evaluation.icons = viewport, render
-    return skinned.evaluation.icons
+    if own.show_in_editmode:
+        # in_depsgraph.py has switched them since Blender copied them.
+        left_out = skinned.left_out.get(evaluated.as_pointer())
+        return skinned.noted.layout.icons if left_out is None else left_out.icons
+    replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
+    viewport, render = (
+        Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced)) for icon in ICONS
+    )
+    return viewport, render
 
 
 def _taking_part(icons: tuple[Icons, Icons], mode: str) -> tuple[bool, ...]:

@@ -32,15 +32,11 @@ def check() -> float | None:
     has_ended = is_outdated = False
     # Read first: a run that ends meanwhile gets another check.
     was_running = bool(precomputations.running)
-    for obj, skinned in list(current.pairs):
-        try:
-            # A render may have computed it meanwhile.
-            if precomputing.take_results(obj, skinned) or skinned.has_new_data:
-                has_ended = skinned.needs_apply = True
-            is_outdated |= _see_to_outdated(obj, skinned)
-        except ReferenceError:
-            # The object was deleted since the list was made.
-            continue
+    for obj, skinned in session.living_pairs():
+        # A render may have computed it meanwhile.
+        if precomputing.take_results(obj, skinned) or skinned.has_new_data:
+            has_ended = skinned.needs_plan = True
+        is_outdated |= _see_to_outdated(obj, skinned)
     if has_ended:
         session.refresh_between_steps(bpy.context)
     notify(subscribers.precomputation_shown)
@@ -78,12 +74,12 @@ def resume() -> None:
 def finish(context: bpy.types.Context) -> None:
     """Returns when all objects have what their methods need; for operators that go through frames."""
     if not all(precomputing.has_all(obj, skinned) for obj, skinned in current.pairs):
-        with precomputing.waiting():
+        with precomputing.blocking():
             session.refresh(context)
 
 
 def _refresh() -> None:
     for _obj, skinned in current.pairs:
-        skinned.needs_apply = True
+        skinned.needs_plan = True
     session.refresh(bpy.context)
     begin()

@@ -43,9 +43,9 @@ def request(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.
         if data.is_current(method):
             continue
         is_requested = True
-        if precomputations.waits or not data.has(method):
+        if precomputations.blocks or not data.has(method):
             _request(obj, armature, data, method, depsgraph)
-    if is_requested and not precomputations.waits and is_main_thread():
+    if is_requested and not precomputations.blocks and is_main_thread():
         notify(subscribers.precomputation_requested)
 
 
@@ -99,7 +99,7 @@ def stopped(obj: bpy.types.Object, skinned: SkinnedObject) -> list[str]:
     return list(dict.fromkeys(found))
 
 
-def waits_for(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
+def lacking(obj: bpy.types.Object, skinned: SkinnedObject | None) -> str:
     """Returns what its methods need and lack, as a clause for the panel; empty where they lack nothing."""
     if skinned is None:
         return ""
@@ -137,18 +137,18 @@ def store_in_meshes(pairs: list[tuple[bpy.types.Object, SkinnedObject | None]]) 
 
 
 @contextlib.contextmanager
-def waiting() -> Iterator[None]:
+def blocking() -> Iterator[None]:
     """Context in which results are waited for."""
-    before, precomputations.waits = precomputations.waits, True
+    before, precomputations.blocks = precomputations.blocks, True
     try:
         yield
     finally:
-        precomputations.waits = before
+        precomputations.blocks = before
 
 
 def begin() -> None:
     """Called on registration."""
-    precomputations.waits = bpy.app.background
+    precomputations.blocks = bpy.app.background
     open_cache()
 
 

@@ -24,7 +24,7 @@ from ..attach.subscribers import notify, subscribers
 from ..attach.updates import is_rendering_in_window, may_change_file, phase, updates_suspended
 from ..base.errors import SinewError
 from ..skinning.precompute import precomputations
-from . import after_update, apply_plan, events, undo
+from . import after_update, apply_plan, events, modifier_edits, undo
 from .bound import uid
 from .changes import GONE, Changes, Find
 from .in_depsgraph import DepsgraphRequests
@@ -44,14 +44,13 @@ class Session:
 
     objects           the objects that have Sinew; None where they have to be found again
     objects_seen      what _objects_now() was then
-    skinned           what was read of those that are read, by session_uid
-    pairs             these objects, each with what was read of it
+    known             what is known of each, by its session_uid: of one that is not read, its plan
+    pairs             those that are read, each with what was read of it
     armatures         the data of the armatures of those that are not switched off, by session_uid
-    plans             the plans of the others, by session_uid
     told              the error that was reported last for an object, by its session_uid
     depsgraph         the address of the depsgraph last seen
     view_layers       those whose evaluation was seen, as from identity_of_layer()
-    waiting           the objects that wait for another evaluation, as from waiting()
+    without_upstream  the objects whose upstream proxy is not evaluated, as from without_upstream()
     missed            changes of evaluations that were not reacted to
     expected          meshes that Blender lists as changed because Sinew changed one of its settings
     seen              the meshes that had changed before functions behind Sinew's were called
@@ -62,14 +61,13 @@ class Session:
 
     objects: list[bpy.types.Object] | None = None
     objects_seen: tuple[int, int] = (0, 0)
-    skinned: dict[int, SkinnedObject] = field(default_factory=dict)
+    known: dict[int, SkinnedObject | Plan] = field(default_factory=dict)
     pairs: SkinnedObjects = field(default_factory=list)
     armatures: set[int] = field(default_factory=set)
-    plans: dict[int, Plan] = field(default_factory=dict)
     told: dict[int, str] = field(default_factory=dict)
     depsgraph: int = 0
     view_layers: set[tuple[int, str]] = field(default_factory=set)
-    waiting: set[tuple[int, int]] = field(default_factory=set)
+    without_upstream: set[tuple[int, int]] = field(default_factory=set)
     missed: Changes | None = None
     expected: set[int] = field(default_factory=set)
     seen: set[str] | None = None
@@ -103,9 +101,9 @@ def forget() -> None:
 
 def forget_object(obj: bpy.types.Object) -> None:
     """Forgets an object that Sinew is taken off; others stay bound."""
-    gone = _forget_known(obj)
+    gone = current.known.pop(obj.session_uid, None)
     current.objects, current.all_use_builtin = None, False
-    current.pairs = [(other, state) for other, state in current.pairs if state is not gone]
+    current.pairs = [(other, skinned) for other, skinned in current.pairs if skinned is not gone]
     name_requests()
 
 
@@ -116,9 +114,9 @@ def forget_for_step(changed: set[int]) -> None:
     """
     known, depsgraph = {}, current.depsgraph
     if current.missed is None and not current.is_after_step:
-        known = undo.known_before(current.pairs, depsgraph)
+        known = undo.known_before(living_pairs(), depsgraph)
     forget()
-    current.skinned = {uid: state for uid, state in known.items() if uid not in changed}
+    current.known = {uid: skinned for uid, skinned in known.items() if uid not in changed}
     current.depsgraph, current.is_after_step = depsgraph, True
 
 
@@ -128,37 +126,39 @@ def adopt_after_step() -> None:
 
 
 def _find_pairs(objects: list[bpy.types.Object]) -> None:
-    current.pairs = [(obj, state) for obj in objects if (state := state_of(obj)) is not None]
+    current.pairs = [(obj, skinned) for obj in objects if (skinned := skinned_of(obj)) is not None]
     current.armatures = {
         armature.data.session_uid
-        for obj, state in current.pairs
-        if state.plan.is_read
+        for obj, skinned in current.pairs
+        if skinned.plan.is_read
         for armature in properties.of(obj).armatures
     }
     name_requests()
 
 
+def living_pairs() -> SkinnedObjects:
+    """Returns the objects that are read, each with what was read of it, without those that were deleted since
+    they were found."""
+    return [(obj, skinned) for obj, skinned in current.pairs if _is_alive(obj)]
+
+
+def _is_alive(obj: bpy.types.Object) -> bool:
+    try:
+        return obj.session_uid != 0
+    except ReferenceError:
+        return False
+
+
 def name_requests() -> None:
     """Names the objects for their requests as they are called now, before an evaluation."""
-    states, names = {}, set()
-    for obj, state in current.pairs:
-        # The object may have been deleted since the list was made.
-        with contextlib.suppress(ReferenceError):
-            states[obj.session_uid] = state
-            names.add(obj.name)
-    requests.set_objects(states, names)
-
-
-def _forget_known(obj: bpy.types.Object) -> SkinnedObject | None:
-    """Returns what was read of the object."""
-    current.plans.pop(obj.session_uid, None)
-    return current.skinned.pop(obj.session_uid, None)
+    pairs = living_pairs()
+    requests.set_objects({obj.session_uid: skinned for obj, skinned in pairs}, {obj.name for obj, _ in pairs})
 
 
 def plan_of(obj: bpy.types.Object) -> Plan:
     """Returns who deforms an object that has Sinew, and when, as of the last event."""
-    state = state_of(obj)
-    return current.plans.get(obj.session_uid, UNSEEN) if state is None else state.plan
+    known = current.known.get(obj.session_uid, UNSEEN)
+    return known if isinstance(known, Plan) else known.plan
 
 
 def error_of(obj: bpy.types.Object) -> str:
@@ -167,26 +167,27 @@ def error_of(obj: bpy.types.Object) -> str:
     return plan.reason if plan.state is State.REFUSED else ""
 
 
-def state_of(obj: bpy.types.Object) -> SkinnedObject | None:
+def skinned_of(obj: bpy.types.Object) -> SkinnedObject | None:
     """Returns what was read of an object; None for nothing, as plan_of() says."""
-    return current.skinned.get(obj.session_uid)
+    known = current.known.get(obj.session_uid)
+    return None if isinstance(known, Plan) else known
 
 
-def states_of(
+def deformed_now(
     objects: Iterable[bpy.types.Object] | None, depsgraph: bpy.types.Depsgraph | None
 ) -> list[tuple[bpy.types.Object, SkinnedObject]]:
     """Returns the objects that Sinew deforms now, or would if their Armature modifiers did not, each with
     what is known of it in this evaluation. Empty where depsgraph is None."""
     if depsgraph is None:
         return []
-    pairs = []
+    pairs: SkinnedObjects = []
     for obj in objects or ():
-        state = state_of(obj) if properties.of(obj).enabled else None
-        if state is not None:
+        skinned = skinned_of(obj) if properties.of(obj).enabled else None
+        if skinned is not None:
             with contextlib.suppress(SinewError):
-                after_update.bring_up_to_date(obj, state, depsgraph)
-                pairs.append((obj, state))
-    return [(obj, state) for obj, state in pairs if state.shown.frames is not None]
+                after_update.bring_up_to_date(obj, skinned, depsgraph)
+                pairs.append((obj, skinned))
+    return [(obj, skinned) for obj, skinned in pairs if skinned.shown.frames is not None]
 
 
 # --- Settings
@@ -206,8 +207,8 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
             # Updates are suspended, or a handler switched an object off: whoever did that goes on from here.
             return
         current.objects = None
-        for uid, state in current.skinned.items():
-            state.needs_apply |= changed is None or uid == changed.session_uid
+        for obj, skinned in living_pairs():
+            skinned.needs_plan |= changed is None or obj.session_uid == changed.session_uid
     # Handlers react to this evaluation by themselves, in time for what others' later handlers change. What
     # these change of objects that are deformed after the update is only there at its end.
     depsgraph = context.evaluated_depsgraph_get()
@@ -215,17 +216,20 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
     # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
     if bpy.app.background:
         # If no object waits, this evaluation only shows what was just changed: Sinew need not react to it.
-        with contextlib.nullcontext() if waiting() else updates_suspended():
+        with contextlib.nullcontext() if without_upstream() else updates_suspended():
             context.view_layer.update()
         note_shown(depsgraph)
-    upstream_proxy.just_made.clear()
+    upstream_proxy.compared.clear()
 
 
 def note_shown(depsgraph: bpy.types.Depsgraph) -> None:
     """Notes the meshes that viewports show, at the end of an event, or of an evaluation by Sinew."""
-    for obj, state in current.pairs:
-        with contextlib.suppress(ReferenceError):
-            state.note_shown(obj, depsgraph)
+    new = [pair for pair in current.pairs if not pair[1].evaluation.given <= {pair[1].viewport_mesh}]
+    # Those of renders and exporters are others.
+    if new and depsgraph == depsgraph.view_layer.depsgraph:
+        for obj, skinned in new:
+            if _is_alive(obj):
+                skinned.note_shown(obj, depsgraph)
 
 
 def refresh_between_steps(context: bpy.types.Context) -> None:
@@ -262,7 +266,7 @@ def _forget_unless_bare(obj: bpy.types.Object) -> None:
     """Forgets the object, so that the next event reads it. Without an Armature modifier it stays refused:
     unknown, it would lose Sinew, and with it its settings."""
     if stack.armature_modifier(obj) is not None:
-        _forget_known(obj)
+        current.known.pop(obj.session_uid, None)
 
 
 def read_again(obj: bpy.types.Object) -> None:
@@ -295,15 +299,15 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
         _remove_groups_taken_apart(changes)
         _adopt_copied_modifiers(changes)
         _note_readers(changes)
-        for state in current.skinned.values():
-            state.needs_recheck |= changes.lost
-        for obj in objects_with_sinew(changes):
+        for _obj, skinned in current.pairs:
+            skinned.needs_recheck |= changes.lost
+        for obj in objects_with_sinew(changes.structure):
             _update(obj, depsgraph, changes)
         # Undo would free what it refers to.
         normals.users_of_all.cache_clear()
-        _find_pairs(objects_with_sinew(Changes()))
-        for obj, state in current.pairs:
-            state.needs_recheck |= obj.data.session_uid in read_later
+        _find_pairs(objects_with_sinew())
+        for obj, skinned in current.pairs:
+            skinned.needs_recheck |= obj.data.session_uid in read_later
         current.all_use_builtin = _do_all_use_builtin()
         notify(subscribers.deformed, current.objects or [], depsgraph)
         notify(subscribers.frame_shown)
@@ -312,10 +316,10 @@ def update_all(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
 def _drop_unknown(depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
     """Forgets objects that an undo step changed. Called with the first evaluation after undo or redo."""
     current.is_after_step = False
-    current.skinned = {
-        obj.session_uid: state
-        for obj, state in current.pairs
-        if changes.complete and undo.is_known_after(obj, state, depsgraph, changes)
+    current.known = {
+        obj.session_uid: skinned
+        for obj, skinned in current.pairs
+        if changes.complete and undo.is_known_after(obj, skinned, depsgraph, changes)
     }
 
 
@@ -327,7 +331,7 @@ def needs_first_evaluations() -> bool:
     """Whether an object needs handlers to be deformed in an evaluation, not only the driver."""
     with contextlib.suppress(ReferenceError):
         return any(
-            plan_of(obj).state is State.WAITING_UPSTREAM or plan_of(obj).is_written
+            plan_of(obj).state is State.WAITING or plan_of(obj).is_written
             # After undo and redo the objects have to be found again.
             for obj in (bpy.data.objects if current.objects is None else current.objects)
             if properties.has_sinew(obj)
@@ -336,9 +340,10 @@ def needs_first_evaluations() -> bool:
     return False
 
 
-def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
-    """Returns the objects that have Sinew. Searches again where objects may have been added or removed."""
-    if current.objects is None or changes.structure or current.objects_seen != _objects_now():
+def objects_with_sinew(may_be_others: bool = False) -> list[bpy.types.Object]:
+    """Returns the objects that have Sinew. Searches again where objects were, or may have been, added or
+    removed."""
+    if current.objects is None or may_be_others or current.objects_seen != _objects_now():
         current.objects = [obj for obj in bpy.data.objects if properties.has_sinew(obj)]
         if may_change_file():
             orphans.remove()
@@ -346,19 +351,17 @@ def objects_with_sinew(changes: Changes) -> list[bpy.types.Object]:
         notify(subscribers.objects_changed, current.objects)
         point_store.unshare(current.objects)
         uids = {obj.session_uid for obj in current.objects}
-        for known in (current.skinned, current.plans):
-            for uid in known.keys() - uids:
-                del known[uid]
+        current.known = {uid: known for uid, known in current.known.items() if uid in uids}
     return current.objects
 
 
-def waiting() -> set[tuple[int, int]]:
-    """Returns the objects that wait until Blender evaluates their upstream proxy for the viewport, each by
-    its session_uid and that of the proxy, which may be made anew meanwhile."""
+def without_upstream() -> set[tuple[int, int]]:
+    """Returns the objects whose upstream proxy Blender has yet to evaluate for the viewport, each by its
+    session_uid and that of the proxy, which may be made anew meanwhile."""
     return {
         (obj.session_uid, uid(properties.of(obj).storage.upstream_proxy))
-        for obj in objects_with_sinew(Changes())
-        if plan_of(obj).state is State.WAITING_UPSTREAM
+        for obj in objects_with_sinew()
+        if plan_of(obj).state is State.WAITING
         and properties.of(obj).replaces_modifiers
         and layout.read(obj).icons[0].sinew
     }
@@ -379,11 +382,11 @@ def were_all_deformed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     if meshes and GONE in meshes:
         return False
     if not _is_each(
-        lambda obj, state: (
-            state.was_deformed(obj, depsgraph)
-            and state.is_untouched_by_frame(obj, meshes)
+        lambda obj, skinned: (
+            skinned.was_deformed(obj, depsgraph)
+            and skinned.is_untouched_by_frame(obj, meshes)
             # Up to Blender 5.1 the points are requested also for a modifier without its node group.
-            and state.is_attached(obj)
+            and skinned.is_attached(obj)
         )
     ):
         return False
@@ -400,7 +403,7 @@ def were_only_posed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
     changes = Changes.of_poses(depsgraph, original)
     if changes is None or not changes.armatures <= current.armatures:
         return False
-    if not _is_each(lambda obj, state: state.was_only_posed(obj, depsgraph, changes)):
+    if not _is_each(lambda obj, skinned: skinned.was_only_posed(obj, depsgraph, changes)):
         return False
     notify(subscribers.frame_shown)
     return True
@@ -409,32 +412,32 @@ def were_only_posed(depsgraph: bpy.types.Depsgraph, original: Find) -> bool:
 def _is_each(holds: Callable[[bpy.types.Object, SkinnedObject], bool]) -> bool:
     """Whether something holds for each object that Sinew reads, and each was read."""
     try:
-        return all(
-            not plan_of(obj).is_read or ((state := state_of(obj)) is not None and holds(obj, state))
-            for obj in current.objects or ()
-        )
+        for obj in current.objects or ():
+            known = current.known.get(obj.session_uid, UNSEEN)
+            was_read = not isinstance(known, Plan)
+            plan = known.plan if was_read else known
+            if plan.is_read and not (was_read and holds(obj, known)):
+                return False
     except ReferenceError:
         # The object was deleted since the list was made.
         return False
+    return True
 
 
 def _do_all_use_builtin() -> bool:
     """Whether Sinew has nothing to do in a frame, as long as nothing but poses changes."""
-    try:
-        return all(
-            plan_of(obj).state in (State.OFF, State.REFUSED)
-            or (plan_of(obj).uses_builtin and obj.animation_data is None)
-            for obj in current.objects or ()
-        )
-    except ReferenceError:
-        return False
+    return all(
+        plan_of(obj).state in (State.OFF, State.REFUSED)
+        or (plan_of(obj).uses_builtin and obj.animation_data is None)
+        for obj in current.objects or ()
+    )
 
 
 def _update(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Changes) -> None:
-    old, known = plan_of(obj), state_of(obj)
+    old, known = plan_of(obj), skinned_of(obj)
     try:
         now = layout.read(obj) if _may_be_removed(obj, changes) else None
-        if now is not None and _follow_removal(obj, now, old):
+        if now is not None and modifier_edits.follow_removal(obj, now, old, known):
             return
         found = update(obj, now, old, known, depsgraph, changes)
     except ReferenceError:
@@ -443,16 +446,13 @@ def _update(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, changes: Chan
         return
     except Exception as error:
         found = _refuse(obj, old, error)
-    _forget_known(obj)
-    if isinstance(found, Plan):
-        current.plans[obj.session_uid] = found
-        # Each error is reported once.
-        if found.state is State.REFUSED and current.told.get(obj.session_uid) != found.reason:
-            log.error("%s", found.reason)
-            current.told[obj.session_uid] = found.reason
-    else:
-        current.skinned[obj.session_uid] = found
+    current.known[obj.session_uid] = found
+    if not isinstance(found, Plan):
         current.told.pop(obj.session_uid, None)
+    # Each error is reported once.
+    elif found.state is State.REFUSED and current.told.get(obj.session_uid) != found.reason:
+        log.error("%s", found.reason)
+        current.told[obj.session_uid] = found.reason
 
 
 def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
@@ -469,7 +469,7 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
         log.error("%s", text, exc_info=error)
         current.told[obj.session_uid] = text
     try:
-        apply_plan.apply(obj, old, refused)
+        apply_plan.apply(obj, layout.read(obj), old, refused)
     except Exception as failure:
         log.error("%s: its Armature modifier may not deform it: %s", obj.name, failure, exc_info=failure)
     return refused
@@ -477,26 +477,11 @@ def _refuse(obj: bpy.types.Object, old: Plan, error: Exception) -> Plan:
 
 def _may_be_removed(obj: bpy.types.Object, changes: Changes) -> bool:
     """Whether its stack has to be looked at for Sinew's modifier."""
-    state = state_of(obj)
+    skinned = skinned_of(obj)
     are_listed = changes.structure or obj.session_uid in changes.objects or not changes.complete
-    if not are_listed and (state is None or state.is_attached(obj)):
+    if not are_listed and (skinned is None or skinned.is_attached(obj)):
         return False
     return obj.is_editable and may_change_file()
-
-
-def _follow_removal(obj: bpy.types.Object, now: layout.Layout, plan: Plan) -> bool:
-    """Whether the object has lost Sinew's modifier; Sinew is then taken off it."""
-    if not apply_plan.has_lost_modifier(obj, now, plan):
-        return False
-    state = state_of(obj)
-    # The last shape is computed only here, not at each pose.
-    rest, shown = (None, None) if state is None else (state.bound.source.points, state.points)
-    apply_plan.follow_removal(obj, rest, shown)
-    if state is not None:
-        state.take_off_normals(obj.data)
-    _forget_known(obj)
-    current.objects = None
-    return True
 
 
 def _remove_groups_taken_apart(changes: Changes) -> None:
@@ -515,17 +500,15 @@ def _adopt_copied_modifiers(changes: Changes) -> None:
     for obj in changes.edited if may_change_file() else ():
         # The object may have been deleted since.
         with contextlib.suppress(ReferenceError):
-            is_plain = obj.type == "MESH" and obj.library is None and not properties.is_helper(obj)
-            if is_plain and not properties.has_sinew(obj) and not properties.is_copy(obj):
-                changes.structure |= apply_plan.adopt_copied_modifier(obj)
+            changes.structure |= modifier_edits.adopt_copy(obj)
 
 
 def _note_readers(changes: Changes) -> None:
     """An edited object may now read other objects' meshes, which decides who computes normals."""
     with contextlib.suppress(ReferenceError):
         if any(normals.may_read_meshes(obj) for obj in changes.edited):
-            for state in current.skinned.values():
-                state.needs_apply |= bool(state.plan.normals.domain or state.plan.normals_reason)
+            for _obj, skinned in current.pairs:
+                skinned.needs_plan |= bool(skinned.plan.normals.domain or skinned.plan.normals_reason)
 
 
 def expect_mesh_update(obj: bpy.types.Object) -> None:

@@ -48,9 +48,8 @@ def is_builtin_faster(obj: bpy.types.Object, now: Layout, given: Kind | None) ->
 def has_builtin_shape(obj: bpy.types.Object) -> bool:
     """Whether Armature modifiers, with a suitable Preserve Volume, give the shape that Sinew is set to."""
     settings = properties.of(obj)
-    methods = {settings.method} | {replaced.method for replaced in settings.replaced_modifiers}
     return (
-        methods - {properties.SAME_METHOD} <= set(VERTICES)
+        VERTICES.keys() >= set(settings.methods)
         and settings.scale_rule == BLENDER_4.name
         and stage_settings.has_defaults(settings, VERTICES)
         and not stage_settings.names_on(settings)
@@ -60,13 +59,13 @@ def has_builtin_shape(obj: bpy.types.Object) -> bool:
 def other_volume(obj: bpy.types.Object) -> list[bpy.types.ArmatureModifier]:
     """Returns the Armature modifiers whose Preserve Volume differs from Sinew's method and is not
     followed."""
-    method, now = properties.of(obj).method, layout.read(obj)
-    pairs = zip(now.skins, attach.replaced_modifiers(obj, now), strict=True)
+    now = layout.read(obj)
+    pairs = attach.replaced_modifiers(obj, now)
+    methods = attach.methods_by_name(properties.of(obj))
     return [
         modifier
-        for number, (skin, (modifier, replaced)) in enumerate(pairs)
-        if method_of(modifier) != properties.method_of_modifier(method, replaced.method, is_first=number == 0)
-        and not attach.is_volume_followed(obj, skin)
+        for skin, (modifier, replaced) in zip(now.skins, pairs, strict=True)
+        if method_of(modifier) != methods[replaced.name] and not attach.is_volume_followed(obj, skin)
     ]
 
 

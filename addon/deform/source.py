@@ -19,6 +19,9 @@ from ..skinning.shape_keys import ShapeKeys
 from ..skinning.stage_mesh import Topology
 from .changes import Changes
 
+# What is compared beside group names and weights.
+_COMPARED = ("points", "mesh_points", "triangles", "sdef_keys", "topology", "shading", "shape_keys")
+
 
 @dataclass
 class Source:
@@ -73,22 +76,22 @@ class Source:
         return self.points if self.own_points is None else self.own_points
 
     def equals(self, other: Source) -> bool:
-        if self is other:
-            return True
-        keys, known = self.shape_keys, other.shape_keys
-        if (keys is None) != (known is None) or not self.equals_but_for_points(other):
-            return False
-        has_same_keys = keys is None or keys.equals(known)
-        return (
-            has_same_keys
-            and self.has_same_surface(other)
-            and self.has_same_shading(other)
-            and are_equal(self.points, other.points)
-        )
+        return self is other or (self.has_same_weights(other) and self._has_same(other, *_COMPARED))
+
+    def has_same_weights(self, other: Source) -> bool:
+        return self.group_names == other.group_names and self._has_same(other, "weights")
+
+    def has_same_surface(self, other: Source) -> bool:
+        """Whether everything that methods compute vertex data from, except weights, is the same. It is where
+        upstream only moves points."""
+        return self._has_same(other, "mesh_points", "triangles", "sdef_keys")
 
     def has_same_shading(self, other: Source) -> bool:
         """Whether the same points give the same normals."""
-        return self.shading.equals(other.shading) and self.topology.equals(other.topology)
+        return self._has_same(other, "shading", "topology")
+
+    def _has_same(self, other: Source, *names: str) -> bool:
+        return all(are_equal(getattr(self, name), getattr(other, name)) for name in names)
 
     def make_normals(self) -> None:
         """Prepares the normals. Otherwise the first frame would, which takes as long as several frames."""
@@ -117,13 +120,9 @@ class Source:
     def take_what_equals(self, other: Source) -> None:
         """Takes over the other's arrays that equal these. So later comparisons cost nothing, and an identical
         array signals that nothing moved."""
-        for name in ("points", "mesh_points", "triangles", "sdef_keys"):
-            if are_equal(getattr(self, name), getattr(other, name)):
+        for name in ("weights", *_COMPARED):
+            if self._has_same(other, name):
                 setattr(self, name, getattr(other, name))
-        for name in ("weights", "topology", "shading", "shape_keys"):
-            mine, its = getattr(self, name), getattr(other, name)
-            if mine is not None and its is not None and mine.equals(its):
-                setattr(self, name, its)
         self.keep_normals_of(other)
 
     def keep_normals_of(self, other: Source) -> None:
@@ -131,17 +130,6 @@ class Source:
         made = other.__dict__.get("normals")
         if made is not None and self.has_same_shading(other) and len(self.points) == len(other.points):
             self.__dict__["normals"] = made
-
-    def equals_but_for_points(self, other: Source) -> bool:
-        return self.group_names == other.group_names and self.weights.equals(other.weights)
-
-    def has_same_surface(self, other: Source) -> bool:
-        """Whether everything that methods compute vertex data from, except weights, is the same. It is where
-        upstream only moves points."""
-        return all(
-            are_equal(getattr(self, name), getattr(other, name))
-            for name in ("mesh_points", "triangles", "sdef_keys")
-        )
 
 
 def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool = True) -> bool:

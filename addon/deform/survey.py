@@ -5,6 +5,7 @@ import bpy
 import numpy as np
 
 from ..attach import attach, group_uses, layout, other_tools, properties, stack, stage_settings
+from ..attach.layout import Layout
 from ..attach.modifier_options import ModifierOptions
 from ..base.errors import SinewError
 from ..base.phrases import phrase
@@ -16,6 +17,7 @@ from ..skinning.vectors import transformed
 
 def describe(
     obj: bpy.types.Object,
+    now: Layout,
     armature: bpy.types.Object | None,
     weighting: Weighting,
     points: np.ndarray,
@@ -23,6 +25,7 @@ def describe(
 ) -> RigFacts:
     """Returns counts, and warnings about what is missing in the rig or not reproduced.
 
+    now       its layout
     armature  of its first Armature modifier; None where it was deleted, and others deform the mesh
     points    [vertices, 3], rest points in object space
     """
@@ -34,13 +37,12 @@ def describe(
     boneless = weighting.bones.groups_without_bone([group.name for group in obj.vertex_groups])
     masks = group_uses.used(obj, boneless)
     facts = describe_rig(weighting, points, [name for name in boneless if name not in masks])
-    found = [*_apart(obj), *_missing_groups(obj), *_other_sdef(obj), *other_tools.warnings(obj)]
+    found = [*_apart(now), *_missing_groups(obj), *_other_sdef(obj), *other_tools.warnings(obj, now)]
     return facts.with_warnings(found)
 
 
-def _apart(obj: bpy.types.Object) -> list[str]:
+def _apart(now: Layout) -> list[str]:
     """Returns a sentence where Armature modifiers do not directly follow the first."""
-    now = layout.read(obj)
     others = (m for m in now.modifiers if m not in now.skins)
     names = [m.name for m in others if m.armature is not None and m.armature.uid]
     text = (
@@ -93,7 +95,8 @@ def describe_in_file(obj: bpy.types.Object) -> RigFacts:
     options = ModifierOptions.read(stack.armature_modifier(obj))
     weighting = options.weighting(obj.vertex_groups.keys(), weights, bones)
     points = mesh_io.read_points(obj.data)
-    return describe(obj, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
+    now = layout.read(obj)
+    return describe(obj, now, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
 
 
 def _obstacles(obj: bpy.types.Object) -> list[str]:

@@ -7,8 +7,6 @@ before the step and after it. Listed data is read again; bones, and what the art
 object itself, are always compared.
 """
 
-import contextlib
-
 import bpy
 
 from ..attach import layout
@@ -30,34 +28,28 @@ def known_before(
     replaces_all = getattr(bpy.context.preferences.experimental, "use_undo_legacy", False)
     if not is_seen or replaces_all:
         return {}
-    known = {}
-    for obj, state in pairs:
-        # The object may have been deleted since the list was made.
-        with contextlib.suppress(ReferenceError):
-            if _is_known(obj, state, depsgraph):
-                known[obj.session_uid] = state
-    return known
+    return {obj.session_uid: skinned for obj, skinned in pairs if _is_known(obj, skinned, depsgraph)}
 
 
-def _is_known(obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool:
-    plan, evaluation = state.plan, state.evaluation
+def _is_known(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph) -> bool:
+    plan, evaluation = skinned.plan, skinned.evaluation
     return (
         plan.state is State.IN_DEPSGRAPH
-        and not (plan.in_buffer or state.bound.source.from_upstream)
-        and not (state.needs_recheck or state.needs_apply)
+        and not (plan.lacks or plan.in_buffer or skinned.bound.source.from_upstream)
+        and not (skinned.needs_recheck or skinned.needs_plan)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
-        and obj.mode == state.noted.layout.mode == "OBJECT"
+        and obj.mode == skinned.noted.layout.mode == "OBJECT"
         and _is_shown(obj, depsgraph)
     )
 
 
 def is_known_after(
-    obj: bpy.types.Object, state: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
+    obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.types.Depsgraph, changes: Changes
 ) -> bool:
     """Whether this is still the known object with its shape. Called with the first evaluation after the
     step."""
-    has_shape = state.was_deformed(obj, depsgraph) or state.noted.dependencies.isdisjoint(changes.touched)
-    return _is_shown(obj, depsgraph) and has_shape and state.is_as_noted(obj, layout.read(obj))
+    has_shape = skinned.was_deformed(obj, depsgraph) or skinned.noted.dependencies.isdisjoint(changes.touched)
+    return _is_shown(obj, depsgraph) and has_shape and skinned.is_as_noted(obj, layout.read(obj))
 
 
 def _is_shown(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> bool:

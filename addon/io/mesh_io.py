@@ -256,7 +256,7 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
         move = points[block.name] - points[block.relative_key.name]
         mask = _mask_of(block, names, weights)
         moves.append(move if mask is None else mask * move)
-    return ShapeKeys(tuple(points), points[basis.name], moves)
+    return ShapeKeys(tuple(points), points[basis.name], tuple(moves))
 
 
 def _mask_of(block: bpy.types.ShapeKey, group_names: list[str], weights: GroupWeights) -> np.ndarray | None:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
-"""Arrays that may be None compared; arrays read from Blender's collections."""
+"""Compares arrays and records of them; reads arrays from Blender's collections."""
 
 from dataclasses import dataclass, fields
 from typing import Any, Self
@@ -7,9 +7,18 @@ from typing import Any, Self
 import numpy as np
 
 
-def are_equal(a: np.ndarray | None, b: np.ndarray | None) -> bool:
-    """Whether both are None, or both have the same shape and numbers."""
-    return a is b or (a is not None and b is not None and np.array_equal(a, b))
+def are_equal(a: Any, b: Any) -> bool:
+    """Whether both are None, or both have the same shape and numbers: arrays, records and tuples of them."""
+    if a is b or a is None or b is None:
+        return a is b
+    if isinstance(a, np.ndarray):
+        # As np.array_equal(), in less time.
+        return a.shape == b.shape and bool((a == b).all())
+    if isinstance(a, OfArrays):
+        return a.equals(b)
+    if isinstance(a, tuple):
+        return len(a) == len(b) and all(map(are_equal, a, b))
+    return bool(a == b)
 
 
 @dataclass(frozen=True)
@@ -18,11 +27,17 @@ class OfArrays:
     are made of something else."""
 
     def equals(self, other: Self) -> bool:
-        pairs = ((getattr(self, f.name), getattr(other, f.name)) for f in fields(self) if f.compare)
-        return self is other or all(
-            a.equals(b) if isinstance(a, OfArrays) else a == b if isinstance(a, tuple) else are_equal(a, b)
-            for a, b in pairs
-        )
+        names = _compared.get(type(self))
+        if names is None:
+            names = _compared[type(self)] = [each.name for each in fields(self) if each.compare]
+        for name in () if self is other else names:
+            if not are_equal(getattr(self, name), getattr(other, name)):
+                return False
+        return True
+
+
+# The fields of each class, as finding them takes longer than comparing them.
+_compared: dict[type, list[str]] = {}
 
 
 def read(elements: Any, name: str, width: int = 1, kind: type = np.float32) -> np.ndarray:

@@ -27,13 +27,13 @@ _SECONDS_BETWEEN_CHECKS = 0.05
 class Precomputations:
     """All precomputations of a process. Any thread may use it.
 
-    waits    results are computed at once while the caller waits: nobody watches, or a render needs them
+    blocks   results are computed at once while the caller waits: nobody watches, or a render needs them
     cache    the folder that stores results, None for none
     stopped  the keys that the artist has stopped
     """
 
     def __init__(self, cache: FileCache | None = None) -> None:
-        self.waits = True
+        self.blocks = True
         self.cache = cache
         self.stopped: set[str] = set()
         # With the time of its start. time.monotonic() has steps of 16 ms on Windows before Python 3.13.
@@ -121,4 +121,4 @@ class Precomputations:
 
 
 precomputations = Precomputations()
-"""The one of this process. In a window, deform/precomputing.py sets `waits`."""
+"""The one of this process. In a window, deform/precomputing.py sets `blocks`."""

@@ -28,6 +28,23 @@ class Shading(OfArrays):
     custom: np.ndarray | None = None
 
 
+@dataclass(frozen=True)
+class GivenNormals:
+    """The normals that Sinew gives along with the points.
+
+    domain                  POINT or CORNER: the elements that have normals; empty where Blender computes them
+    are_skinned             skinned from the rest normals, not computed from the deformed surface
+    are_for_viewport_alone  in renders Blender computes them
+    """
+
+    domain: str = ""
+    are_skinned: bool = False
+    are_for_viewport_alone: bool = False
+
+
+NO_NORMALS = GivenNormals()
+
+
 class SurfaceNormals:
     """Computes the normals of a mesh as Blender defines them. For an invalid mesh, as one whose faces lack
     edges, they are zeros, which mean no normals."""

@@ -1,17 +1,15 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """The mix of relative shape keys, which Blender applies before all modifiers."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Self
 
 import numpy as np
 
-from .arrays import are_equal
+from .arrays import OfArrays
 
 
 @dataclass(frozen=True)
-class ShapeKeys:
+class ShapeKeys(OfArrays):
     """The relative shape keys of a mesh.
 
     names   of all keys, in order
@@ -21,14 +19,7 @@ class ShapeKeys:
 
     names: tuple[str, ...]
     basis: np.ndarray
-    deltas: Sequence[np.ndarray | None]
-
-    def equals(self, other: Self) -> bool:
-        return self is other or (
-            self.names == other.names
-            and np.array_equal(self.basis, other.basis)
-            and all(are_equal(a, b) for a, b in zip(self.deltas, other.deltas, strict=True))
-        )
+    deltas: tuple[np.ndarray | None, ...]
 
     def mix(self, values: np.ndarray) -> np.ndarray:
         """float32 [vertices, 3] with each key at its value; a muted key's value is 0."""

@@ -169,7 +169,7 @@ class VertexData:
         with self._lock:
             entry = self._entry(method)
             is_ready = entry.made is not None
-            if precomputations.waits:
+            if precomputations.blocks:
                 # Outdated data is then computed again, which needs triangles.
                 is_ready = self.triangles is not None or (is_ready and not entry.is_outdated)
             if not is_ready:
@@ -208,7 +208,7 @@ class VertexData:
             return self._given.get(method)
         with self._lock:
             entry = self._entries.setdefault(method, _Entry())
-            if entry.made is not None and not (entry.is_outdated and precomputations.waits):
+            if entry.made is not None and not (entry.is_outdated and precomputations.blocks):
                 return entry.made
             start = self._prepare(entry, method, bones_from_model)
             if entry.made is not None and not entry.is_outdated:
@@ -223,7 +223,7 @@ class VertexData:
         Otherwise starts to compute it, unless the artist stopped it."""
         if method not in PROVIDERS or self.is_current(method):
             return
-        if precomputations.waits:
+        if precomputations.blocks:
             self.of(method, bones_from_model)
             return
         with self._lock:

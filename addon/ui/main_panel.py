@@ -140,7 +140,9 @@ def _draw_character(
             names=names,
         )
     state_text.draw_character(layout, context, meshes)
-    precomputing.draw(layout, [(obj, session.state_of(obj)) for obj in meshes if properties.of(obj).enabled])
+    precomputing.draw(
+        layout, [(obj, session.skinned_of(obj)) for obj in meshes if properties.of(obj).enabled]
+    )
 
 
 def stages_text(names: Sequence[str], room: int) -> str:

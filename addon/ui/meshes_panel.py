@@ -103,7 +103,7 @@ def _draw_further_modifiers(layout: bpy.types.UILayout, settings: properties.Sin
 
 
 def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
-    armature, state = properties.of(obj).armature, session.state_of(obj)
+    armature, state = properties.of(obj).armature, session.skinned_of(obj)
     rows = [("Armature", armature.name if armature else tr("none"))]
     if state is not None:
         facts = state.bound.facts

@@ -135,7 +135,7 @@ def _draw_parameter(
 
 def _draw_twists(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     """Draws the bones that share a twist, with their own settings, and why others do not."""
-    state, armature = session.state_of(obj), properties.of(obj).armature
+    state, armature = session.skinned_of(obj), properties.of(obj).armature
     if state is None or armature is None:
         return
     twists = state.bound.first_deformer.bones.twists

@@ -19,7 +19,6 @@ ICONS = {
     State.LINKED: "MOD_ARMATURE",
     State.EDITING: "MOD_ARMATURE",
     State.BUILT_IN: "MOD_ARMATURE",
-    State.WAITING_UPSTREAM: "SORTTIME",
     State.WAITING: "SORTTIME",
     State.IN_DEPSGRAPH: "CHECKMARK",
     State.AFTER_UPDATE: "RECOVER_LAST",
@@ -32,7 +31,7 @@ def reasons_of(obj: bpy.types.Object) -> list[str]:
     plan = session.plan_of(obj)
     if plan.state in (State.OFF, State.REFUSED):
         return []
-    return [each for each in (plan.reason, *plan.view_reasons) if each]
+    return [each for each in (plan.lacks or plan.reason, *plan.view_reasons) if each]
 
 
 def sentence_of(obj: bpy.types.Object) -> str:
@@ -48,8 +47,8 @@ def sentence_of(obj: bpy.types.Object) -> str:
         return tr(text, modifiers=replaced)
     method = tr(properties.method_label(settings.method))
     # What is switched off in one view may wait until the other is evaluated.
-    is_waiting = plan.state is State.WAITING_UPSTREAM and not plan.view_reasons
-    if plan.uses_builtin or plan.state is State.WAITING or is_waiting:
+    is_waiting = plan.state is State.WAITING and not plan.view_reasons
+    if plan.uses_builtin or plan.lacks or is_waiting:
         until = tr("{modifiers} deforms it until the next frame", modifiers=replaced)
         return ". ".join((method, *map(tr, reasons_of(obj) or (until,))))
     text = tr("{method} in the place of {modifiers}", method=method, modifiers=replaced)
@@ -77,22 +76,22 @@ def icon_of(obj: bpy.types.Object) -> str:
         return "HIDE_ON"
     if plan.is_read and plan.viewport is Deformer.ARMATURE:
         return ICONS[State.BUILT_IN]
-    return ICONS[plan.state]
+    return ICONS[State.WAITING if plan.lacks else plan.state]
 
 
 def problems_of(obj: bpy.types.Object) -> list[str]:
     """Returns what the artist should fix, apart from what prevents Sinew."""
-    settings, state, failed = properties.of(obj), session.state_of(obj), lifecycle.failure_of_saving(obj)
+    settings, state, failed = properties.of(obj), session.skinned_of(obj), lifecycle.failure_of_saving(obj)
     found = [failed] if failed else []
     if state is None:
         return found
     found += state.bound.lacks((settings.method, settings.mix.method))
-    if state.evaluation.failures:
+    if state.failures.count:
         found.append(
             tr(
                 "{count} times not deformed within Blender's evaluation; last: {failure}",
-                count=state.evaluation.failures,
-                failure=tr(state.evaluation.failure),
+                count=state.failures.count,
+                failure=tr(state.failures.last),
             )
         )
     found += state.bound.facts.warnings

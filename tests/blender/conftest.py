@@ -100,14 +100,14 @@ def nothing_of_commands(monkeypatch):
     yield
     characters.set_parameters({})
     precomputations.cancel_all()
-    precomputations.waits = True
+    precomputations.blocks = True
     precomputations.stopped.clear()
 
 
 @pytest.fixture
 def in_window():
     """As in an interactive session: nothing waits."""
-    precomputations.waits = False
+    precomputations.blocks = False
 
 
 def look_until_done() -> None:

@@ -237,7 +237,7 @@ def make_rig(set_up: SetUp) -> tuple[bpy.types.Object, bpy.types.Object]:
 
 def vertex_data(obj: bpy.types.Object, method: str) -> np.ndarray | None:
     """The method's vertex data in the library's form."""
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     assert state is not None
     kept = state.bound.first_deformer.vertex_data
     return None if kept is None else kept.of(method, np.eye(4))

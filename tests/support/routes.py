@@ -35,13 +35,13 @@ def taken(obj: bpy.types.Object, shapes_before: int) -> str:
 
     Raises NotBySinewError if the shape is not Sinew's.
     """
-    settings, state = properties.of(obj), session.state_of(obj)
+    settings, state = properties.of(obj), session.skinned_of(obj)
     if not settings.enabled:
         raise NotBySinewError(f"Sinew is off: {settings.error}")
     if state is None or state.shown.frames is None:
         raise NotBySinewError("Sinew has not deformed it")
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    modifiers, is_within = obj.evaluated_get(depsgraph).modifiers, bool(state.evaluation.mesh)
+    modifiers, is_within = obj.evaluated_get(depsgraph).modifiers, bool(state.evaluation.given)
     if not modifiers[stack.sinew_modifier(obj).name].show_viewport:
         raise NotBySinewError("its modifier is off")
     for modifier in modifiers:

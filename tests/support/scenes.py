@@ -353,14 +353,14 @@ def handler(event: str, function: Callable, first: bool = False) -> Iterator[Non
         functions.remove(function)
 
 
-def states_of(obj: bpy.types.Object) -> list:
+def deformed_now(obj: bpy.types.Object) -> list:
     """An object that Sinew deforms, and its state at this frame, for measuring."""
-    return session.states_of([obj], bpy.context.evaluated_depsgraph_get())
+    return session.deformed_now([obj], bpy.context.evaluated_depsgraph_get())
 
 
 def measure(obj: bpy.types.Object, other: str = "blender") -> live.Subject:
     """What the panel measures of it at this frame, against another method."""
-    return live.measure(states_of(obj), other, bpy.context.evaluated_depsgraph_get())
+    return live.measure(deformed_now(obj), other, bpy.context.evaluated_depsgraph_get())
 
 
 def worst(a: np.ndarray, b: np.ndarray) -> float:

@@ -281,7 +281,7 @@ class _Rig:
 def joint_counts(meshes: Sequence[bpy.types.Object]) -> list[int]:
     """Returns how many joints move vertices, for each armature; empty where Sinew deforms none."""
     found: dict[bpy.types.Object, set[int]] = {}
-    for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+    for obj, state in session.deformed_now(meshes, bpy.context.evaluated_depsgraph_get()):
         influences = state.bound.first_deformer.weighting.influences(state.shown.rest_points)
         found.setdefault(properties.of(obj).armature, set()).update(influences.bones.tolist())
     return [max(len(bones) - 1, 0) for bones in found.values()]
@@ -349,7 +349,7 @@ def replace_bendy_bones(
     """
     found: dict[bpy.types.Object, list[bpy.types.Object]] = {}
     kept: list[str] = []
-    for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+    for obj, state in session.deformed_now(meshes, bpy.context.evaluated_depsgraph_get()):
         try:
             if state.shown.frames[0] is not None and state.bound.first_deformer.bends:
                 found.setdefault(_rig_of(obj), []).append(obj)

@@ -91,7 +91,7 @@ def skinned_now(obj: bpy.types.Object) -> SkinnedObject:
     """Returns the object's state at the current frame. Raises SinewError where Sinew does not give its
     modifier a shape."""
     # The depsgraph as it was evaluated for the frame: evaluating what Sinew wrote since is not needed.
-    pairs = session.states_of([obj], bpy.context.view_layer.depsgraph)
+    pairs = session.deformed_now([obj], bpy.context.view_layer.depsgraph)
     if not pairs or obj.mode in ARMATURE_MODIFIER_MODES:
         raise _off(obj)
     return pairs[0][1]

@@ -31,7 +31,7 @@ def add(
     Raises SinewError, and changes nothing, where a key is not possible.
     """
     _check(obj)
-    pairs = session.states_of([obj], depsgraph)
+    pairs = session.deformed_now([obj], depsgraph)
     if not pairs:
         raise SinewError(properties.of(obj).error or f"{obj.name}: switch Sinew on, as its shape is wanted")
     turns = None if bone is None else _turns(bone)

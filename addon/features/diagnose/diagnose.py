@@ -259,7 +259,7 @@ def _weights_equal(obj: bpy.types.Object, weights: GroupWeights) -> bool:
     if obj.mode == "EDIT":
         # Before it is written back to the mesh.
         return mesh_io.read_edited_weights(bmesh.from_edit_mesh(obj.data)).equals(weights)
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     if state is not None and not state.bound.source.from_upstream:
         # Sinew has read them already.
         return state.bound.source.weights.equals(weights)

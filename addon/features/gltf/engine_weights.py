@@ -26,7 +26,7 @@ def prepare(meshes: Sequence[bpy.types.Object], kind: str) -> list[str]:
     kind  the ending of the file
     """
     found, left_out = [], []
-    for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+    for obj, state in session.deformed_now(meshes, bpy.context.evaluated_depsgraph_get()):
         replaced = properties.of(obj).replaced_modifiers
         if len(replaced) == 1 and state.shown.frames[0] is not None:
             rig = replaced[0].armature

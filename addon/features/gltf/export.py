@@ -141,7 +141,7 @@ def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
             continue
         try:
             found.append(_skinning_of(obj, depsgraph))
-            if session.states_of([obj], depsgraph)[0][1].bound.first_deformer.bends:
+            if session.deformed_now([obj], depsgraph)[0][1].bound.first_deformer.bends:
                 left_out.append(
                     f"{obj.name}: exported without the bends of its bendy bones; run `sinew export`, or bake "
                     "to bones first"
@@ -152,7 +152,7 @@ def collect(context: bpy.types.Context) -> tuple[list[Skinning], list[str]]:
 
 
 def _skinning_of(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph) -> Skinning:
-    states = session.states_of([obj], depsgraph)
+    states = session.deformed_now([obj], depsgraph)
     if not states or properties.of(obj).armature is None:
         raise SinewError("Sinew does not deform it")
     if len(properties.of(obj).replaced_modifiers) != 1:

@@ -59,7 +59,7 @@ class Recording:
             if kind == ".glb":
                 # Its exporter reads what stands still at this frame.
                 characters.set_frame(scene, 0)
-            for obj, state in session.states_of(meshes, bpy.context.evaluated_depsgraph_get()):
+            for obj, state in session.deformed_now(meshes, bpy.context.evaluated_depsgraph_get()):
                 if reason := _reason(obj, state):
                     self.left_out.append(f"{obj.name}: not verified: {reason}")
                 else:
@@ -68,7 +68,7 @@ class Recording:
                 report(0.5 * number / (len(self._times) + 1))
                 characters.set_frame(scene, frame)
                 depsgraph = bpy.context.evaluated_depsgraph_get()
-                for obj, state in session.states_of(meshes, depsgraph):
+                for obj, state in session.deformed_now(meshes, depsgraph):
                     if obj.name in self._meshes:
                         each = self._meshes[obj.name].seen_at(obj, state, frame, kind)
                         self._meshes[obj.name].seen_frames.append(each)

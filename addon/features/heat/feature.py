@@ -53,7 +53,7 @@ def _objects_changed(_objects: list[bpy.types.Object]) -> None:
 
 def _colour(objects: list[bpy.types.Object], depsgraph: bpy.types.Depsgraph) -> None:
     heated = [obj for obj in objects if properties.of(obj).heat]
-    heat_map.update(session.states_of(heated, depsgraph), depsgraph)
+    heat_map.update(session.deformed_now(heated, depsgraph), depsgraph)
 
 
 FEATURE = Feature(

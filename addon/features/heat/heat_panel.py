@@ -166,7 +166,7 @@ class SINEW_PT_numbers(Sidebar, operators.OfSkinned, bpy.types.Panel):
         settings = measures.of(context.scene)
         # The last evaluation: nothing may be evaluated while drawing, as that can write.
         depsgraph = context.view_layer.depsgraph
-        pairs = session.states_of(operators.sinew_targets(context), depsgraph)
+        pairs = session.deformed_now(operators.sinew_targets(context), depsgraph)
         subject = live.measure(pairs, settings.other, depsgraph) if depsgraph is not None else None
         if subject is None:
             draw_text(self.layout, "Sinew deforms nothing here now", icon="INFO")

@@ -212,7 +212,7 @@ def measure_now(objects: Sequence[bpy.types.Object], other: str, what: str) -> S
     what  is to be done, in words
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    subject = measure(session.states_of(objects, depsgraph), other, depsgraph)
+    subject = measure(session.deformed_now(objects, depsgraph), other, depsgraph)
     if subject is None:
         raise SinewError(f"Nothing to {what}: Sinew deforms none of the chosen meshes")
     return subject

@@ -59,7 +59,7 @@ class MeasuredOn:
         depsgraph = bpy.context.evaluated_depsgraph_get()
         meshes = {
             obj.session_uid: _Mesh(state.bound, _settings(obj, depth), _armatures(obj))
-            for obj, state in session.states_of(objects, depsgraph)
+            for obj, state in session.deformed_now(objects, depsgraph)
         }
         return cls(meshes, depth, over, _frames(scene, objects, over), _keys(objects) if over else [])
 
@@ -73,7 +73,7 @@ class MeasuredOn:
             return ["meshes"] if objects else []
         found: dict[str, bool] = dict.fromkeys(("mesh", "weights", "bones", "stages", "settings"), False)
         for uid, obj in objects.items():
-            state, known = session.state_of(obj), self.meshes[uid]
+            state, known = session.skinned_of(obj), self.meshes[uid]
             if state is None:
                 continue
             if state.bound is not known.bound:
@@ -127,7 +127,7 @@ def _differing(now: Bound, before: Bound) -> list[str]:
     pairs = zip(now.skin_stack.skins, before.skin_stack.skins, strict=False)
     return [
         *(["mesh"] if not (is_same_mesh and are_equal(source.surface_points, known.surface_points)) else []),
-        *(["weights"] if not source.equals_but_for_points(known) or now.groups != before.groups else []),
+        *(["weights"] if not source.has_same_weights(known) or now.groups != before.groups else []),
         *(["bones"] if not all(a.deformer.bones.equals(b.deformer.bones) for a, b in pairs) else []),
         *(["settings"] if now.options != before.options else []),
     ]

@@ -224,7 +224,7 @@ def _play(
             poses.append([_bone_matrices(part) for part in subject.parts])
         if result is not None and method in result.times:
             result.times[method].append(taken)
-            states = [session.state_of(obj) for obj in subject.meshes if method != characters.BLENDER]
+            states = [session.skinned_of(obj) for obj in subject.meshes if method != characters.BLENDER]
             result.own[method].append(sum(state.shown.milliseconds for state in states if state is not None))
     return shapes
 

@@ -163,7 +163,7 @@ def _bones(armature: bpy.types.Object, meshes: Sequence[bpy.types.Object]) -> tu
     evaluated = armature.evaluated_get(bpy.context.evaluated_depsgraph_get())
     bones, moving = armature_io.read_bones(evaluated), set()
     for obj in meshes:
-        state = session.state_of(obj)
+        state = session.skinned_of(obj)
         if state is not None and properties.of(obj).armature == armature:
             deformer = state.bound.first_deformer
             moving.update(deformer.moving_bones)

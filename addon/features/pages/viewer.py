@@ -274,7 +274,7 @@ def _read(
     variants  those among the methods, by their keys
     """
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    found = session.states_of([each for each in objects if properties.has_sinew(each)], depsgraph)
+    found = session.deformed_now([each for each in objects if properties.has_sinew(each)], depsgraph)
     if not found:
         raise SinewError("Sinew deforms neither it nor a copy of it")
     obj_of_state, state = found[0]

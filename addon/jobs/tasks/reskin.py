@@ -120,7 +120,7 @@ def _use_sinew(
             if properties.has_sinew(obj) and not had_sinew:
                 attach.remove(obj)
             continue
-        state = session.state_of(obj)
+        state = session.skinned_of(obj)
         mesh = {
             "object": obj.name,
             "vertices": len(obj.data.vertices),

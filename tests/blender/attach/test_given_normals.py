@@ -201,6 +201,7 @@ OBSTACLES = {
     "shrinkwrap of a bone": (add_shrinkwrap_of_bone, "another object"),
     "hair": (add_hair, "another object"),
     "instances": (lambda obj: setattr(obj, "instance_type", "FACES"), "instances"),
+    "heat map": (lambda obj: setattr(obj.sinew, "heat", True), "its heat map is shown"),
 }
 
 
@@ -214,7 +215,7 @@ def test_blender_computes_normals_where_other_objects_read_them(name):
     bpy.context.view_layer.update()
     bpy.context.scene.frame_set(5)
     assert not has_given(obj)
-    assert reason in session.state_of(obj).plan.normals_reason
+    assert reason in session.skinned_of(obj).plan.normals_reason
     given, left = both(obj)
     np.testing.assert_array_equal(given, left)
 
@@ -313,7 +314,7 @@ def test_free_normals_of_the_mesh_stay():
     attribute.data.foreach_set("vector", np.tile(np.float32([0, 0, 1]), len(obj.data.vertices)))
     scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(7)
-    assert session.state_of(obj).plan.normals.domain == ""
+    assert session.skinned_of(obj).plan.normals.domain == ""
     assert (corners(obj) == (0, 0, 1)).all()
 
 
@@ -515,7 +516,7 @@ def test_skinned_normals_move_by_the_inverse_transpose_of_the_blend(shading):
     offsets, bones, weights = scenes.weights_of(obj)
     for frame in (5, 11):
         bpy.context.scene.frame_set(frame)
-        assert session.state_of(obj).plan.normals.are_skinned
+        assert session.skinned_of(obj).plan.normals.are_skinned
         assert has_given(obj)
         place = np.linalg.inv(np.array(obj.matrix_world)) @ np.array(armature.matrix_world)
         motions = place @ scenes.bone_motions(armature) @ np.linalg.inv(place)

@@ -27,7 +27,7 @@ STATES = {routes.EVALUATION: State.IN_DEPSGRAPH, routes.UPDATE: State.AFTER_UPDA
 def arm(route) -> bpy.types.Object:
     obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(6)
-    assert session.state_of(obj).plan.state is STATES[route]
+    assert session.skinned_of(obj).plan.state is STATES[route]
     return obj
 
 
@@ -109,7 +109,7 @@ def upstream_beside_a_linked_duplicate(obj: bpy.types.Object) -> None:
     """With the same mesh, and Sinew, but without an upstream modifier."""
     copy = scenes.copied(obj, linked=True)
     bpy.context.view_layer.update()
-    assert session.state_of(copy) is not None
+    assert session.skinned_of(copy) is not None
     upstream(obj)
 
 

@@ -101,5 +101,5 @@ def test_what_is_measured_has_the_frames_own():
     for frame, wanted in zip(FRAMES, expected, strict=True):
         bpy.context.scene.frame_set(frame)
         depsgraph = bpy.context.evaluated_depsgraph_get()
-        ((_obj, state),) = session.states_of([obj], depsgraph)
+        ((_obj, state),) = session.deformed_now([obj], depsgraph)
         assert scenes.worst(state.points, wanted) <= scenes.TOLERANCE * scenes.diagonal(obj)

@@ -150,7 +150,7 @@ def test_hooks_behind_take_a_vertex_group(has_group):
     bpy.context.scene.frame_set(6)
     expected = scenes.final_points(obj)
     scenes.add_sinew(obj)
-    warnings = " ".join(session.state_of(obj).bound.facts.warnings)
+    warnings = " ".join(session.skinned_of(obj).bound.facts.warnings)
     is_equal = scenes.worst(scenes.final_points(obj), expected) <= 1e-5
     assert is_equal == has_group
     assert ("this Hook" in warnings) != has_group
@@ -250,7 +250,7 @@ def test_points_that_are_never_requested_are_deformed_after_the_update(monkeypat
     monkeypatch.setattr(properties.listeners, "mesh_requested", lambda _mesh: None)
     scenes.shapes(obj, [1, 2])
     assert np.array_equal(scenes.shapes(obj, [3, 6, 11]), expected)
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     assert state.plan.state is State.AFTER_UPDATE
     assert update.NOT_REQUESTED in state.plan.reason
     assert any(update.NOT_REQUESTED in each for each in state_text.problems_of(obj))
@@ -429,9 +429,9 @@ def test_a_failure_within_the_evaluation_is_counted_and_deformed_after_it(monkey
 
     monkeypatch.setattr(in_depsgraph, "_deform", fail)
     got = scenes.shapes(obj, [2, 3, 4, 5])
-    state = session.state_of(obj)
-    assert state.evaluation.failures > 0
-    assert "disk on fire" in state.evaluation.failure
+    state = session.skinned_of(obj)
+    assert state.failures.count > 0
+    assert "disk on fire" in state.failures.last
     assert state.plan.state is State.AFTER_UPDATE
     assert "disk on fire" in state.plan.reason
     monkeypatch.undo()
@@ -487,4 +487,4 @@ def test_a_renamed_modifier_is_no_failure(name, route):
     obj.modifiers[name].name = "Another"
     bpy.context.view_layer.update()
     assert scenes.worst(scenes.final_points(obj), expected) <= 1e-6
-    assert session.state_of(obj).evaluation.failures == 0
+    assert session.skinned_of(obj).failures.count == 0

@@ -171,14 +171,16 @@ def test_a_frame_passes_few_modules_after_the_evaluation(set_up):
     for frame in (1, 2, 3):
         bpy.context.scene.frame_set(frame)
     pose(armature)
-    shown = session.state_of(obj).shown.number
+    shown = session.skinned_of(obj).shown.number
     passed = modules_passed(lambda: pose(armature))
     passed |= modules_passed(lambda: bpy.context.scene.frame_set(4))
-    assert session.state_of(obj).shown.number == shown + 2
+    assert session.skinned_of(obj).shown.number == shown + 2
     for function, modules in passed.items():
         print(function, len(modules), *sorted(modules))
-    assert len(passed["on_frame_change"]) <= 8
-    assert len(passed["on_depsgraph_update"]) <= 11
+    assert len(passed["on_frame_change"]) <= 7
+    assert len(passed["on_depsgraph_update"]) <= 10
+    # Blender may call it on another thread.
+    assert len(passed.get("get", ())) <= 15
 
 
 CHANGES = {
@@ -200,7 +202,7 @@ def test_what_changes_along_with_a_pose_is_noticed(change):
     pose(armature)
     CHANGES[change](obj, armature)
     pose(armature)
-    shown, state = scenes.final_points(obj), session.state_of(obj)
+    shown, state = scenes.final_points(obj), session.skinned_of(obj)
     assert state.is_as_noted(obj, layout.read(obj))
     assert state.noted.name == obj.name
     scenes.assert_as_without(obj, shown)
@@ -374,13 +376,13 @@ def test_objects_that_move_beside_their_armatures():
 
 
 def test_a_frame_writes_into_the_evaluated_mesh_alone():
-    """Not into the mesh itself, of which it is a copy; state_of() returns the same shape."""
+    """Not into the mesh itself, of which it is a copy; skinned_of() returns the same shape."""
     obj, _armature = scenes.skinned_arm("dq")
     bpy.context.scene.frame_set(1)
     attribute = obj.data.attributes[properties.of(obj).storage.attribute]
     stored = scenes.points_of(attribute.data, "vector")
     bpy.context.scene.frame_set(7)
-    ((_obj, state),) = scenes.states_of(obj)
+    ((_obj, state),) = scenes.deformed_now(obj)
     shown = scenes.final_points(obj)
     assert scenes.worst(shown, stored) > 0.1 * scenes.diagonal(obj)
     assert np.array_equal(state.points, shown)

@@ -121,13 +121,13 @@ def arm_by_cor() -> bpy.types.Object:
 
 
 def plan_of(obj: bpy.types.Object):
-    return session.state_of(obj).plan
+    return session.skinned_of(obj).plan
 
 
 @pytest.mark.parametrize("preserve_volume", [False, True])
 def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
     expected, by_modifier = shape_by_cor(), shapes_by_modifier(preserve_volume)
-    precomputations.waits = False
+    precomputations.blocks = False
     gate.count = 0
     gate.close()
     obj, _armature = scenes.make_arm(bones=3)
@@ -137,14 +137,14 @@ def test_the_modifiers_shape_until_it_is_found(gate, route, preserve_volume):
     tolerance = scenes.TOLERANCE * scenes.diagonal(obj)
     assert gate.count == 1
     assert gate.gives_way
-    assert plan_of(obj).state is State.WAITING
-    assert "centres of rotation" in plan_of(obj).reason
-    assert precomputing.running(obj, session.state_of(obj)).keys() == {"centres of rotation"}
+    assert plan_of(obj).lacks
+    assert "centres of rotation" in plan_of(obj).lacks
+    assert precomputing.running(obj, session.skinned_of(obj)).keys() == {"centres of rotation"}
     assert scenes.worst(scenes.final_points(obj), by_modifier) <= tolerance
     assert precompute_watch.check() is not None
     gate.open()
     look_until_done()
-    assert plan_of(obj).state is not State.WAITING
+    assert not plan_of(obj).lacks
     assert scenes.worst(scenes.final_points(obj), expected) <= tolerance
     assert scenes.worst(expected, by_modifier) > 100 * tolerance
     assert gate.count == 1
@@ -156,14 +156,14 @@ def test_stopped_it_waits_for_the_button(gate, in_window):
     assert gate.count == 1
     bpy.ops.sinew.stop_precomputation()
     assert not precomputations.running
-    assert plan_of(obj).state is State.WAITING
-    assert "stopped" in plan_of(obj).reason
+    assert plan_of(obj).lacks
+    assert "stopped" in plan_of(obj).lacks
     gate.open()
     bpy.context.scene.frame_set(FRAME)
     session.refresh(bpy.context)
     look_until_done()
     assert gate.count == 1
-    assert precomputing.stopped(obj, session.state_of(obj)) == ["centres of rotation"]
+    assert precomputing.stopped(obj, session.skinned_of(obj)) == ["centres of rotation"]
     bpy.ops.sinew.precompute()
     look_until_done()
     assert plan_of(obj).state is State.IN_DEPSGRAPH
@@ -191,23 +191,23 @@ def test_a_result_that_comes_between_two_events_is_no_failure():
     other, _armature = scenes.make_arm(name="Other")
     scenes.add_sinew(other, "dq")
     bpy.context.scene.frame_set(FRAME)
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     other.location.x += 1.0
     bpy.context.view_layer.update()
-    assert state.evaluation.mesh == 0
+    assert not state.evaluation.given
     state.bound.first_deformer.vertex_data.version += 1
     assert state.has_new_data
     properties.of(other).method = "qv"
-    assert state.evaluation.failures == 0
+    assert state.failures.count == 0
     assert not state.has_new_data
 
 
 def test_a_render_waits(gate, route, rendered_points):
     expected = shape_by_cor()
-    precomputations.waits = False
+    precomputations.blocks = False
     gate.close()
     obj = arm_by_cor()
-    assert plan_of(obj).state is State.WAITING
+    assert plan_of(obj).lacks
     threading.Timer(0.2, gate.open).start()
     points = rendered_points(obj)
     assert scenes.worst(points, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
@@ -221,7 +221,7 @@ def test_a_render_waits_also_for_what_was_stopped(gate, in_window, rendered_poin
     bpy.context.scene.frame_set(FRAME)
     points = rendered_points(obj)
     forget_made()
-    precomputations.waits = True
+    precomputations.blocks = True
     scenes.rebind(obj)
     assert scenes.worst(points, scenes.final_points(obj)) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
@@ -246,13 +246,13 @@ def move_weights(obj: bpy.types.Object) -> None:
 def test_while_weights_are_painted_the_old_centres_serve(gate, route):
     obj = arm_by_cor()
     assert gate.count == 1
-    precomputations.waits = False
+    precomputations.blocks = False
     for _ in range(3):
         move_weights(obj)
         # The next stroke comes before the artist has paused.
         assert precompute_watch.check() is not None
         assert gate.count == 1
-        assert plan_of(obj).state is not State.WAITING
+        assert not plan_of(obj).lacks
     by_old = scenes.final_points(obj)
     time.sleep(precompute_watch.PAUSE)
     look_until_done()
@@ -260,7 +260,7 @@ def test_while_weights_are_painted_the_old_centres_serve(gate, route):
     by_new = scenes.final_points(obj)
     assert scenes.worst(by_old, by_new) > 1e-4
     forget_made()
-    precomputations.waits = True
+    precomputations.blocks = True
     scenes.rebind(obj)
     assert scenes.worst(by_new, scenes.final_points(obj)) == 0.0
 
@@ -324,14 +324,14 @@ def test_a_keyed_method_is_asked_for_when_it_comes(gate, route):
     gate.count = 0
     forget_made()
     scenes.rebind(obj)
-    precomputations.waits = False
+    precomputations.blocks = False
     bpy.context.scene.frame_set(FRAME)
     look_until_done()
     found = scenes.final_points(obj)
     assert gate.count == 1
-    assert not precomputing.waits_for(obj, session.state_of(obj))
+    assert not precomputing.lacking(obj, session.skinned_of(obj))
     obj.animation_data_clear()
-    precomputations.waits = True
+    precomputations.blocks = True
     obj.sinew.method = "cor"
     assert scenes.worst(scenes.final_points(obj), found) <= scenes.TOLERANCE * scenes.diagonal(obj)
 
@@ -344,7 +344,7 @@ def test_an_object_that_is_off_has_nothing_to_wait_for(gate):
     obj.sinew.enabled = False
     obj.sinew.method = "cor"
     bpy.context.view_layer.update()
-    precomputations.waits = False
+    precomputations.blocks = False
     time.sleep(precompute_watch.PAUSE)
     look_until_done()
     assert gate.count == 1
@@ -363,8 +363,8 @@ def test_a_mesh_without_faces_is_blended_linearly_and_the_panel_says_so():
     edited.free()
     assert not obj.data.polygons
     scenes.add_sinew(obj, "cor")
-    assert "no faces" in session.state_of(obj).bound.lacks(["cor"])[0]
-    assert session.state_of(obj).bound.lacks(["dq"]) == []
+    assert "no faces" in session.skinned_of(obj).bound.lacks(["cor"])[0]
+    assert session.skinned_of(obj).bound.lacks(["dq"]) == []
     bpy.context.scene.frame_set(FRAME)
     by_cor = scenes.final_points(obj)
     obj.sinew.method = "lbs"
@@ -384,7 +384,7 @@ def saved(tmp_path) -> tuple[np.ndarray, Path]:
 def test_a_file_has_it(gate, tmp_path):
     points, path = saved(tmp_path)
     for waits in (True, False):
-        precomputations.waits = waits
+        precomputations.blocks = waits
         forget_made()
         obj = scenes.opened(path)
         assert plan_of(obj).state is State.IN_DEPSGRAPH
@@ -400,8 +400,8 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
     over = obj.override_create(remap_local_usages=True)
     assert rig is not None
     bpy.context.view_layer.update()
-    assert session.state_of(over) is not None
-    assert "cor" in session.state_of(over).bound.first_deformer.vertex_data.made
+    assert session.skinned_of(over) is not None
+    assert "cor" in session.skinned_of(over).bound.first_deformer.vertex_data.made
     assert gate.count == 1
     obj = scenes.opened(path)
     forget_made()
@@ -409,7 +409,7 @@ def test_copies_and_libraries_have_it(gate, tmp_path):
         copy = scenes.copied(obj, linked=linked)
         bpy.context.view_layer.update()
         session.refresh(bpy.context)
-        assert "cor" in session.state_of(copy).bound.first_deformer.vertex_data.made
+        assert "cor" in session.skinned_of(copy).bound.first_deformer.vertex_data.made
     assert gate.count == 1
 
 
@@ -505,7 +505,7 @@ def test_data_of_a_mesh_without_weights_is_not_damaged(caplog):
     session.forget()
     session.refresh(bpy.context)
     bpy.context.scene.frame_set(FRAME + 1)
-    assert "ddm" in session.state_of(obj).bound.first_deformer.vertex_data.made
+    assert "ddm" in session.skinned_of(obj).bound.first_deformer.vertex_data.made
     assert "damaged" not in caplog.text
 
 
@@ -526,6 +526,6 @@ def test_the_folder_has_what_no_file_has(gate, monkeypatch):
         bpy.ops.wm.read_homefile(use_empty=True, use_factory_startup=True)
         forget_made()
         obj, _armature = scenes.skinned_arm("cor", bones=3)
-        assert "cor" in session.state_of(obj).bound.first_deformer.vertex_data.made
+        assert "cor" in session.skinned_of(obj).bound.first_deformer.vertex_data.made
     assert gate.count == 1
     assert properties.has_sinew(obj)

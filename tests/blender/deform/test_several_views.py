@@ -101,7 +101,7 @@ def test_undo_with_a_view_layer_that_is_not_shown(route):
         bpy.context.view_layer.update()
         handlers.check_unannounced()
         obj = bpy.data.objects["Arm"]
-        shown, plan = scenes.final_points(obj), session.state_of(obj).plan
+        shown, plan = scenes.final_points(obj), session.skinned_of(obj).plan
         assert (scene.frame_current, obj.modifiers["Front"].levels) == (4, 1), "nothing is tested"
         scenes.assert_as_without(obj, shown)
         assert plan.is_in_depsgraph == (route == routes.EVALUATION), plan.reason
@@ -123,3 +123,15 @@ def test_an_instanced_collection():
     for frame, points in zip((1, 9), expected, strict=True):
         bpy.context.scene.frame_set(frame)
         assert scenes.worst(instanced_points(), points) <= 1e-5
+
+
+def test_an_exporters_evaluation_is_not_taken_for_a_viewports(tmp_path):
+    """In a viewport's alone, Sinew switches Armature modifiers off."""
+    obj, _armature = scenes.skinned_arm("dq")
+    for frame in (3, 4):
+        bpy.context.scene.frame_set(frame)
+    bpy.ops.wm.usd_export(
+        filepath=str(tmp_path / "arm.usda"), export_animation=True, evaluation_mode="VIEWPORT"
+    )
+    shown = obj.data.evaluated_get(bpy.context.view_layer.depsgraph).as_pointer()
+    assert session.skinned_of(obj).viewport_mesh == shown

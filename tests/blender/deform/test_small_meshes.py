@@ -38,14 +38,14 @@ def deformer(obj: bpy.types.Object) -> str:
     assert own.object is not None
     assert (own.show_viewport and own.show_render) or not by_blender
     assert sinews.show_render == sinews.show_viewport
-    settings, state = properties.of(obj), session.state_of(obj)
+    settings, state = properties.of(obj), session.skinned_of(obj)
     assert (settings.enabled, settings.error) == (True, "")
     assert state.plan.uses_builtin == by_blender
     drivers = obj.animation_data.drivers if obj.animation_data else []
     assert (len(drivers) == 0) == by_blender
     for frame in FRAMES:
         bpy.context.scene.frame_set(frame)
-        ((_obj, known),) = scenes.states_of(obj)
+        ((_obj, known),) = scenes.deformed_now(obj)
         assert scenes.worst(known.points, scenes.final_points(obj)) <= 1e-5 * scenes.diagonal(obj)
     return "blender" if by_blender else "sinew"
 
@@ -146,7 +146,7 @@ def test_on_and_off_and_removed(tmp_path):
     properties.of(obj).method = "qv"
     properties.of(obj).method = "lbs"
     properties.of(obj).enabled = False
-    assert scenes.states_of(obj) == []
+    assert scenes.deformed_now(obj) == []
     properties.of(obj).enabled = True
     assert deformer(obj) == "blender"
     bpy.context.scene.frame_set(1)

@@ -164,17 +164,42 @@ def test_what_a_step_leaves_alone_is_not_read_again(route, edit, tmp_path):
         EDITS[each](bpy.data.objects["Arm"])
         bpy.context.view_layer.update()
         bpy.ops.ed.undo_push(message=each)
-    known = session.state_of(bpy.data.objects["Other"])
+    known = session.skinned_of(bpy.data.objects["Other"])
     bound = known.bound
     # Also a second time: reactions to undo are part of the next step.
     for _time in range(2):
         number = known.shown.number
         bpy.ops.ed.undo()
         other = bpy.data.objects["Other"]
-        assert session.state_of(other) is known
+        assert session.skinned_of(other) is known
         assert known.bound is bound
         # Blender itself evaluates objects with an armature once after each step.
         assert known.shown.number <= number + 1
-        assert session.state_of(bpy.data.objects["Arm"]) is not None
+        assert session.skinned_of(bpy.data.objects["Arm"]) is not None
         bpy.ops.ed.redo()
         bpy.context.view_layer.update()
+
+
+def test_what_a_handler_behind_sinews_changes_in_the_event_of_an_undo(route):
+    _obj, armature = scenes.skinned_arm("lbs")
+    scenes.forget_keys(armature)
+    scenes.bend(armature, 40.0)
+    bpy.ops.mesh.primitive_cube_add()
+    for x in (0.0, 3.0):
+        bpy.data.objects["Cube"].location.x = x
+        bpy.ops.ed.undo_push(message="step")
+    acted = []
+
+    def act(*_args):
+        if not acted:
+            acted.append(1)
+            _points(bpy.data.objects["Arm"])
+
+    with scenes.handler("depsgraph_update_post", act):
+        bpy.ops.ed.undo()
+        bpy.context.view_layer.update()
+        bpy.data.objects["Cube"].location.x = 1.0
+        bpy.context.view_layer.update()
+        arm = bpy.data.objects["Arm"]
+        assert acted
+        scenes.assert_as_without(arm, scenes.final_points(arm))

@@ -184,7 +184,7 @@ class _File:
         for bone in bones:
             bone.location.x += 1.0
         bpy.context.view_layer.update()
-        numbers = [session.state_of(obj).shown.number for obj in meshes]
+        numbers = [session.skinned_of(obj).shown.number for obj in meshes]
         for bone, location in zip(bones, before, strict=True):
             bone.location = location
         bpy.context.view_layer.update()

@@ -550,7 +550,7 @@ def pose(seed: int, features: set[str], armature: bpy.types.Object) -> None:
 
 def undecided(obj: bpy.types.Object) -> np.ndarray:
     """bool [vertices]: those at a discontinuity of a modifier, for an object that was just deformed."""
-    skinned = session.state_of(obj)
+    skinned = session.skinned_of(obj)
     deformers = [
         skin.deformer for skin in skinned.bound.skin_stack.skins if skin.deformer.last_frame is not None
     ]
@@ -589,7 +589,7 @@ def undecided_by(deformer: skin_stack.SkinDeformer) -> np.ndarray:
 def unstable(obj: bpy.types.Object, extent: float) -> np.ndarray:
     """bool [vertices]: those that a change of the input by its rounding moves by the tolerance, such as
     by curved mapping far inside a bend, or by several modifiers in sequence."""
-    skinned = session.state_of(obj)
+    skinned = session.skinned_of(obj)
     rest_points = skinned.shown.rest_points.astype(np.float64)
     moved = numbers(len(rest_points), "rounding").uniform(-1.0, 1.0, rest_points.shape) * ROUNDING * extent
     shapes = []
@@ -716,7 +716,7 @@ def check_refusal(
 def distance_at_seams(obj: bpy.types.Object) -> float:
     """The largest distance between vertices that are one at rest, relative to the diagonal. They have the
     same point, weights and other data. Those where rounding decides are left out."""
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     source, shown = state.bound.source, state.points
     ends = np.cumsum(source.weights.counts)[:-1]
     rows = [np.split(each, ends) for each in (source.weights.groups, source.weights.weights)]
@@ -790,7 +790,7 @@ def error_of_stages(
         for group in groups.values():
             group.enabled = True
         shown = shape_of(obj, armature, method, outcome, route)
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     extent = max(scenes.diagonal(obj), float(np.linalg.norm(np.ptp(shown, axis=0))))
     rng = numbers(len(before), "rounding")
 
@@ -845,7 +845,7 @@ def error_of(
     left_out = undecided(obj) | unstable(obj, extent)
     errors = np.abs(shown - expected).max(axis=1) / extent
     far = np.flatnonzero(~left_out & (errors > scenes.TOLERANCE) & (errors < ROUNDING_OF_BLENDER))
-    if len(far) > 0 and len(session.state_of(obj).bound.skin_stack.skins) > 1:
+    if len(far) > 0 and len(session.skinned_of(obj).bound.skin_stack.skins) > 1:
         with without_modifiers_behind(obj):
             before = shape_of(obj, armature, method, outcome, route)
         left_out[far] = is_nearly_exact(obj, far, before[far], extent)
@@ -861,7 +861,7 @@ def is_nearly_exact(
 
     points  Sinew's, before the modifiers that follow
     """
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     exact, _decided = fuzz_reference.deform(
         state.bound.skin_stack, state.shown.rest_points, state.shown.frames, vertices
     )
@@ -874,7 +874,7 @@ def error_to_reference(
     """As error_of(), for some vertices, compared with the float64 reference."""
     with without_modifiers_behind(obj):
         shown = shape_of(obj, armature, method, outcome, route)
-        state = session.state_of(obj)
+        state = session.skinned_of(obj)
         count = min(REFERENCE_VERTICES, len(shown))
         chosen = np.sort(numbers(seed, "reference").choice(len(shown), count, replace=False))
         expected, decided = fuzz_reference.deform(
@@ -900,7 +900,7 @@ def shape_of(
     for bone in armature.pose.bones:
         bone.location.x += 1.0
     bpy.context.view_layer.update()
-    state = session.state_of(obj)
+    state = session.skinned_of(obj)
     shapes = state.shown.number if state is not None else 0
     for bone, location in zip(armature.pose.bones, before, strict=True):
         bone.location = location

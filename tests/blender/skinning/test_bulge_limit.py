@@ -81,7 +81,7 @@ def test_bendy_bones_are_limited_along_their_curve():
     armature.pose.bones[0].bbone_curveoutx = 0.4
     bpy.context.scene.frame_set(11)
     before = scenes.final_points(obj)
-    bones = session.state_of(obj).bound.first_deformer.bones
+    bones = session.skinned_of(obj).bound.first_deformer.bones
     heads, tails = segments(bones)
     first = bones.first_joints[0]
     along = np.linspace(0.0, 1.0, 5)

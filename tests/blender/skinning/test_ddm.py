@@ -13,7 +13,6 @@ import sinew
 from conftest import look_until_done
 from sinew_addon.attach import attach, properties
 from sinew_addon.deform import session
-from sinew_addon.deform.plan import State
 
 pytestmark = pytest.mark.long_term
 
@@ -80,12 +79,12 @@ def test_in_a_window_the_old_radius_stays_until_the_new_is_computed(in_window):
     bpy.context.scene.frame_set(FRAME)
     scenes.add_sinew(obj, "ddm")
     look_until_done()
-    assert session.state_of(obj).plan.state is not State.WAITING
+    assert not session.skinned_of(obj).plan.lacks
     assert_equal_to_reference(obj, 0.05)
     before = scenes.final_points(obj)
     properties.of(obj).ddm.radius = 0.3
     bpy.context.view_layer.update()
-    assert session.state_of(obj).plan.state is not State.WAITING
+    assert not session.skinned_of(obj).plan.lacks
     assert scenes.worst(scenes.final_points(obj), before) < 1e-6
     look_until_done()
     assert_equal_to_reference(obj, 0.3)

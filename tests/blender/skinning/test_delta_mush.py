@@ -112,7 +112,7 @@ def test_it_is_corrective_smooth_behind_the_armature_modifier(method, settings):
         assert scenes.worst(plain, expected) > 1e-3
     mush(obj, method, **as_stage(settings))
     assert scenes.worst(scenes.shapes(obj, FRAMES), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert session.state_of(obj).plan.state is State.IN_DEPSGRAPH
+    assert session.skinned_of(obj).plan.state is State.IN_DEPSGRAPH
 
 
 def test_keys_change_it_from_frame_to_frame():

@@ -62,7 +62,7 @@ def test_two_modifiers_have_the_same_shape(monkeypatch, name, is_safe):
     mixed(obj)
     got = scenes.shapes(obj, FRAMES)
     assert scenes.worst(got, expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    assert session.state_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
+    assert session.skinned_of(obj).plan.state is (State.AFTER_UPDATE if is_safe else State.IN_DEPSGRAPH)
 
 
 def test_the_second_method_can_be_keyed():
@@ -106,10 +106,10 @@ def test_a_button_makes_the_group_that_is_missing(name):
     mix.method, mix.group = "dq", name
     before = scenes.final_points(obj)
     if name:
-        assert any("nothing is mixed" in text for text in session.state_of(obj).bound.facts.warnings)
+        assert any("nothing is mixed" in text for text in session.skinned_of(obj).bound.facts.warnings)
     assert bpy.ops.sinew.make_group(name=obj.name, stage="mix") == {"FINISHED"}
     assert mix.group == (name or "Mix")
-    assert session.state_of(obj).bound.facts.warnings == ()
+    assert session.skinned_of(obj).bound.facts.warnings == ()
     assert scenes.worst(scenes.final_points(obj), before) == 0.0
     obj.vertex_groups[mix.group].add(range(len(obj.data.vertices)), 1.0, "REPLACE")
     assert scenes.worst(scenes.final_points(obj), before) > 0.01

@@ -34,7 +34,7 @@ def posed_arm(scaled: bool) -> bpy.types.Object:
 
 
 def expected(obj: bpy.types.Object, method: str, rule: str) -> np.ndarray:
-    deformer = session.state_of(obj).bound.first_deformer
+    deformer = session.skinned_of(obj).bound.first_deformer
     frame, rest = deformer.last_frame, deformer.bones.rest.astype(np.float64)
     influences = deformer.weighting.influences(deformer.rest_points)
     motions = frame.pose.astype(np.float64) @ np.linalg.inv(rest)

@@ -86,7 +86,7 @@ def test_a_model_has_the_shape_of_mmd_tools(route):
         assert_as_expected(obj)
     bpy.context.scene.frame_set(8)
     assert scenes.worst(scenes.final_points(obj), linear) > 0.02
-    assert session.state_of(obj).bound.lacks(["sdef"]) == []
+    assert session.skinned_of(obj).bound.lacks(["sdef"]) == []
 
 
 def test_a_model_that_lies_elsewhere(route):
@@ -116,7 +116,7 @@ def test_without_the_keys_all_is_linear_and_the_panel_says_so(route):
     scenes.add_sinew(obj, "sdef")
     bpy.context.scene.frame_set(8)
     assert scenes.worst(scenes.final_points(obj), linear) <= scenes.TOLERANCE * scenes.diagonal(obj)
-    bound = session.state_of(obj).bound
+    bound = session.skinned_of(obj).bound
     assert bound.lacks(["dq", "sdef"]) == [sdef.LACKS_KEYS]
     assert bound.lacks(["dq", "off"]) == []
 
@@ -136,7 +136,7 @@ def test_keys_that_change_or_come_are_read_again(route):
     obj.shape_key_clear()
     bpy.context.scene.frame_set(9)
     assert_as_expected(obj)
-    assert session.state_of(obj).bound.lacks(["sdef"]) == [sdef.LACKS_KEYS]
+    assert session.skinned_of(obj).bound.lacks(["sdef"]) == [sdef.LACKS_KEYS]
 
 
 def test_that_mmd_tools_deforms_it_too_is_said():
@@ -145,7 +145,7 @@ def test_that_mmd_tools_deforms_it_too_is_said():
     scenes.add_sinew(obj, "sdef")
     key = obj.shape_key_add(name="mmd_sdef_skinning", from_mix=False)
     scenes.rebind(obj)
-    assert any("unbind its SDEF" in text for text in session.state_of(obj).bound.facts.warnings)
+    assert any("unbind its SDEF" in text for text in session.skinned_of(obj).bound.facts.warnings)
     key.mute = True
     scenes.rebind(obj)
-    assert not any("unbind" in text for text in session.state_of(obj).bound.facts.warnings)
+    assert not any("unbind" in text for text in session.skinned_of(obj).bound.facts.warnings)

@@ -138,10 +138,10 @@ def test_a_small_mesh_is_not_left_to_the_modifier(small_meshes_as_users_have_the
     settings = properties.of(obj)
     twist(armature, DEGREES[-1])
     shorter = scenes.final_points(obj)
-    assert scenes.states_of(obj)[0][1].plan.uses_builtin
+    assert scenes.deformed_now(obj)[0][1].plan.uses_builtin
     settings.dq.signs = "hierarchy"
     bpy.context.view_layer.update()
-    assert not scenes.states_of(obj)[0][1].plan.uses_builtin
+    assert not scenes.deformed_now(obj)[0][1].plan.uses_builtin
     assert scenes.worst(scenes.final_points(obj), shorter) > 0.1
 
 

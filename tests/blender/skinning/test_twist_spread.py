@@ -24,7 +24,7 @@ def spread(obj: bpy.types.Object, **values: object) -> None:
 
 def assert_spread(obj: bpy.types.Object, before: np.ndarray) -> None:
     """before: float32 [vertices, 3], the shape without the stage"""
-    found, state = scenes.final_points(obj), session.state_of(obj)
+    found, state = scenes.final_points(obj), session.skinned_of(obj)
     values = {"twist_spread": stage_settings.values_of(properties.of(obj), "twist_spread")}
     shown = state.shown
     expected = fuzz_reference.stages_after(
@@ -195,7 +195,7 @@ def limb(names: tuple[str, ...], seed: int | None, across: bool = True) -> bpy.t
 
 
 def twists_of(obj: bpy.types.Object) -> Twists:
-    return session.state_of(obj).bound.first_deformer.bones.twists
+    return session.skinned_of(obj).bound.first_deformer.bones.twists
 
 
 def changed_by_the_stage(obj: bpy.types.Object) -> float:

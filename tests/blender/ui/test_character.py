@@ -145,16 +145,16 @@ def test_a_method_goes_to_all_modifiers_of_a_mesh(armature, door, method):
 
 def test_another_character_stays_bound(armature):
     bpy.ops.sinew.add(method="dq")
-    bound = [session.state_of(obj).bound for obj in meshes()]
+    bound = [session.skinned_of(obj).bound for obj in meshes()]
     other, _rig = scenes.make_arm(name="Other")
     five_meshes.select(other)
     bpy.ops.sinew.add(method="dq")
     bpy.context.scene.frame_set(7)
-    assert [session.state_of(obj).bound for obj in meshes()] == bound
+    assert [session.skinned_of(obj).bound for obj in meshes()] == bound
     bpy.ops.sinew.remove()
     bpy.context.scene.frame_set(8)
-    assert all(session.state_of(obj).bound is each for obj, each in zip(meshes(), bound, strict=True))
-    assert session.state_of(other) is None
+    assert all(session.skinned_of(obj).bound is each for obj, each in zip(meshes(), bound, strict=True))
+    assert session.skinned_of(other) is None
 
 
 def test_one_mesh_can_differ_and_follow_again(armature):

@@ -52,7 +52,7 @@ def test_numbers_of_methods_go_to_the_chosen_folder(preferences, selected, tmp_p
     # A mesh that no other test has: results in memory are not written again.
     selected.data.vertices[0].co.x += 0.0123
     scenes.add_sinew(selected, "cor")
-    assert session.state_of(selected) is not None
+    assert session.skinned_of(selected) is not None
     assert list((tmp_path / "numbers").iterdir())
     # The environment at Blender's start overrides the preferences.
     monkeypatch.setenv(precomputing.VARIABLE, "0")
@@ -62,12 +62,12 @@ def test_numbers_of_methods_go_to_the_chosen_folder(preferences, selected, tmp_p
 
 def test_safe_mode_takes_effect_at_once(preferences, selected, monkeypatch):
     scenes.add_sinew(selected, "dq")
-    assert session.state_of(selected).plan.is_in_depsgraph
+    assert session.skinned_of(selected).plan.is_in_depsgraph
     preferences.safe_mode = True
-    assert session.state_of(selected).plan.after_update
-    assert session.state_of(selected).plan.reason == "Safe mode"
+    assert session.skinned_of(selected).plan.is_written
+    assert session.skinned_of(selected).plan.reason == "Safe mode"
     preferences.safe_mode = False
-    assert session.state_of(selected).plan.is_in_depsgraph
+    assert session.skinned_of(selected).plan.is_in_depsgraph
     monkeypatch.setenv(safe_mode.VARIABLE, "1")
     session.refresh(bpy.context)
-    assert session.state_of(selected).plan.after_update
+    assert session.skinned_of(selected).plan.is_written

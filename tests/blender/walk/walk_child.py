@@ -49,7 +49,7 @@ def make_engine(walker, points_of) -> type:
         def render(self, depsgraph) -> None:
             scene = depsgraph.scene
             for obj in depsgraph.objects:
-                if obj.type == "MESH" and not walker.side.may_react(obj.original):
+                if obj.type == "MESH" and not walker.side.is_helper(obj.original):
                     name = f"{obj.original.name_full} in the render, frame {scene.frame_current}"
                     walker.rendered[name] = points_of(obj)
                     walker.rendered[f"{name}, coordinates"] = coordinates_of(obj)
@@ -228,7 +228,7 @@ class Child:
         if bodies:
             self.bpy.context.view_layer.update()
         for obj in self.bpy.context.view_layer.objects:
-            if obj.type != "MESH" or self.side.may_react(obj) or not obj.visible_get():
+            if obj.type != "MESH" or self.side.is_helper(obj) or not obj.visible_get():
                 continue
             evaluated = obj.evaluated_get(depsgraph)
             found[obj.name_full] = (self.points_of(evaluated), self.np.array(evaluated.matrix_world))
@@ -347,7 +347,7 @@ class Child:
         }
         there = [o for o in self.walker.objects("MESH") if o.library is None and o.users_collection]
         found["meshes"] = sorted({obj.data.name_full for obj in there})
-        of_helpers = {o.data for o in bpy.data.objects if self.side.may_react(o)}
+        of_helpers = {o.data for o in bpy.data.objects if self.side.is_helper(o)}
         found["armatures"] = sorted(
             a.name_full for a in bpy.data.armatures if not (a.library or a in of_helpers)
         )

@@ -167,7 +167,7 @@ class Side:
         pass
 
     prepare = set_safe = compute_beside = wait = nothing
-    may_react = own_modifier = nothing
+    is_helper = own_modifier = nothing
     check_warned = check_refused = check_said_gone = before_render = note_flags = nothing
     bake_to_bones = add_corrective_key = play_motion_range = applied = copied_modifiers = nothing
     start_comparison = end_comparison = arrange_comparison = nothing

@@ -81,7 +81,7 @@ class SinewSide(Side):
         # The walk itself sets which meshes are left to Blender.
         small_meshes.is_used = True
 
-    def may_react(self, obj: bpy.types.Object) -> bool:
+    def is_helper(self, obj: bpy.types.Object) -> bool:
         """Whether Sinew made it for another object."""
         return properties.is_helper(obj) or properties.is_copy(obj)
 
@@ -217,7 +217,7 @@ class SinewSide(Side):
 
     def compute_beside(self, on: bool) -> None:
         """Precomputations run on a thread, as in a window, or before the first frame."""
-        precomputations.waits = not on
+        precomputations.blocks = not on
 
     def character(self, rig: bpy.types.Object) -> list[bpy.types.Object]:
         return [
@@ -225,7 +225,7 @@ class SinewSide(Side):
             for obj in bpy.context.scene.objects
             if obj.type == "MESH"
             and self.has_sinew(obj)
-            and not self.may_react(obj)
+            and not self.is_helper(obj)
             and attach.armature_of(obj) == rig
         ]
 
@@ -400,7 +400,7 @@ class SinewSide(Side):
                 "run": [each.name for each in self._run(obj)],
             }
             for obj in bpy.data.objects
-            if self.has_sinew(obj) and not self.may_react(obj)
+            if self.has_sinew(obj) and not self.is_helper(obj)
         }
 
     def _run(self, obj: bpy.types.Object) -> Iterable:
@@ -422,7 +422,7 @@ class SinewSide(Side):
         # Without a user it is not saved; it belonged to a deleted object.
         objects = [o for o in bpy.data.objects if o.library is None and o.users]
         used = {o.data for o in objects}
-        found = [f"object {o.name}" for o in objects if self.may_react(o)]
+        found = [f"object {o.name}" for o in objects if self.is_helper(o)]
         found += [f"settings of {o.name}" for o in objects if o.is_property_set("sinew")]
         for obj in bpy.data.objects:
             if obj.library is not None:

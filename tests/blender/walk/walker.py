@@ -93,7 +93,7 @@ class Walker:
         found = [
             o
             for o in bpy.data.objects
-            if (kind is None or o.type == kind) and not self.side.may_react(o) and o.name != "Camera"
+            if (kind is None or o.type == kind) and not self.side.is_helper(o) and o.name != "Camera"
         ]
         return sorted(found, key=lambda o: o.name_full)
 

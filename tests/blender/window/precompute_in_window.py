@@ -28,8 +28,10 @@ def hero() -> bpy.types.Object:
 
 
 def plan() -> str:
-    state = sinew("deform.session").state_of(hero())
-    return "none" if state is None else state.plan.state.value
+    state = sinew("deform.session").skinned_of(hero())
+    if state is None:
+        return "none"
+    return "waiting" if state.plan.lacks else state.plan.state.value
 
 
 def off_modifier() -> float:
@@ -125,7 +127,7 @@ def stop_and_go_on() -> Iterator[None]:
     yield from window.until(lambda: not sinew("skinning.precompute").precomputations.running, "its end")
     yield from window.wait()
     facts["plan_stopped"] = plan()
-    facts["reason_stopped"] = sinew("deform.session").state_of(hero()).plan.reason
+    facts["reason_stopped"] = sinew("deform.session").skinned_of(hero()).plan.lacks
     with window.in_view3d():
         bpy.ops.sinew.precompute("INVOKE_DEFAULT")
     yield from window.until(lambda: plan() == "in depsgraph", "its shape", PATIENCE)

@@ -3,11 +3,12 @@
 
 from __future__ import annotations
 
-from dataclasses import fields
+from dataclasses import fields, replace
 
 import pytest
 from sinew_addon.attach.icons import Deformer, Icons
 from sinew_addon.deform.plan import ObjectFacts, State, plan
+from sinew_addon.skinning.shading import GivenNormals
 
 _HIDDEN = {"viewport": Deformer.NOTHING, "render": Deformer.NOTHING}
 TABLE = [
@@ -45,10 +46,6 @@ TABLE = [
     ({"render": Deformer.ARMATURE, "builtin_is_faster": True}, State.IN_DEPSGRAPH, ""),
     ({**_HIDDEN, "mode": "EDIT"}, State.EDITING, "In this mode"),
     ({**_HIDDEN, "enabled": False}, State.OFF, ""),
-    ({"waits_for": "until found"}, State.WAITING, "until found"),
-    ({"waits_for": "until found", "safe_mode": True}, State.WAITING, "until found"),
-    ({"waits_for": "until found", "mode": "EDIT"}, State.EDITING, "In this mode"),
-    ({"waits_for": "until found", "enabled": False}, State.OFF, ""),
 ]
 
 
@@ -78,43 +75,11 @@ def test_what_is_written_after_the_update_is_in_a_buffer(facts):
     assert plan(ObjectFacts(**facts)).in_buffer
 
 
-@pytest.mark.parametrize("route", [{}, {"safe_mode": True}, {"has_upstream": True}, {"mesh_is_shared": True}])
-def test_who_waits_keeps_its_route(route):
-    """So only the method changes when it ends."""
-    waiting, after = plan(ObjectFacts(**route, waits_for="until found")), plan(ObjectFacts(**route))
-    assert (waiting.in_buffer, waiting.after_update) == (after.in_buffer, after.after_update)
-    assert waiting.is_in_depsgraph == after.is_in_depsgraph == (after.state is State.IN_DEPSGRAPH)
-    assert not waiting.uses_builtin
-
-
-SMOOTH = {"gives_normals": True, "normals_domain": "POINT"}
-NORMALS = [
-    ({}, "", ""),
-    (SMOOTH, "POINT", ""),
-    ({**SMOOTH, "normals_domain": "CORNER"}, "CORNER", ""),
-    ({**SMOOTH, "normals_domain": ""}, "", ""),
-    ({**SMOOTH, "gives_normals": False}, "", ""),
-    ({**SMOOTH, "normals_obstacle": "Cast follows"}, "", "Cast follows"),
-    ({**SMOOTH, "has_upstream": True}, "POINT", ""),
-    ({**SMOOTH, "normals_for_viewport_alone": True}, "POINT", ""),
-    ({**SMOOTH, "has_heat_map": True}, "", "heat map"),
-    ({**SMOOTH, "safe_mode": True}, "POINT", ""),
-    ({**SMOOTH, "mesh_is_shared": True}, "POINT", ""),
-    ({**SMOOTH, "waits_for": "until found"}, "POINT", ""),
-    ({**SMOOTH, "skins_normals": True}, "POINT", ""),
-    ({**SMOOTH, "mode": "EDIT"}, "", ""),
-    ({**SMOOTH, "enabled": False}, "", ""),
-]
-
-
-@pytest.mark.parametrize(("facts", "domain", "reason"), NORMALS)
-def test_who_computes_normals(facts, domain, reason):
-    found = plan(ObjectFacts(**facts))
-    assert found.normals.domain == domain
-    assert found.normals.are_skinned == facts.get("skins_normals", False)
-    assert found.normals.are_for_viewport_alone == facts.get("normals_for_viewport_alone", False)
-    assert reason in found.normals_reason
-    assert bool(found.normals_reason) == bool(reason)
+@pytest.mark.parametrize("facts", [facts for facts, *_ in TABLE])
+def test_who_deforms_gives_normals_and_says_what_it_lacks(facts):
+    given = {"normals": GivenNormals("POINT"), "normals_reason": "Cast follows", "lacks": "until found"}
+    plain, found = plan(ObjectFacts(**facts)), plan(ObjectFacts(**facts, **given))
+    assert found == (replace(plain, **given) if plain.is_in_depsgraph or plain.is_written else plain)
 
 
 @pytest.mark.parametrize(
@@ -146,5 +111,5 @@ def test_the_panel_says_what_deforms_in_each_view(viewport, render):
 
 def test_every_fact_matters():
     """A fact that no row changes would not need to be collected."""
-    named = {name for facts, *_ in (*TABLE, *NORMALS) for name in facts}
+    named = {name for facts, *_ in TABLE for name in facts} | {"normals", "normals_reason", "lacks"}
     assert named == {field.name for field in fields(ObjectFacts)}

@@ -93,7 +93,7 @@ def test_it_is_better_than_either_method(method, second):
     at_rest = scenes.final_points(obj)
     assert bpy.ops.sinew.auto_mix() == {"FINISHED"}
     assert (mix.method, mix.group) == (second, "Mix")
-    assert session.state_of(obj).bound.facts.warnings == ()
+    assert session.skinned_of(obj).bound.facts.warnings == ()
     assert scenes.worst(scenes.final_points(obj), at_rest) < 1e-6
     mixed = worst(obj)
     # Shares of the better method's worst value.

@@ -130,8 +130,8 @@ def test_while_sinew_is_at_work():
     obj.vertex_groups.new(name=GROUP).add([1, 2, 3], 1.0, "REPLACE")
     obj.modifiers["Armature"].vertex_group = GROUP
     scenes.add_sinew(obj, "dq")
-    assert session.state_of(obj).bound.facts.warnings == ()
+    assert session.skinned_of(obj).bound.facts.warnings == ()
     obj.modifiers["Armature"].vertex_group = ""
     bpy.context.view_layer.update()
     scenes.rebind(obj)
-    assert any(GROUP in warning for warning in session.state_of(obj).bound.facts.warnings)
+    assert any(GROUP in warning for warning in session.skinned_of(obj).bound.facts.warnings)

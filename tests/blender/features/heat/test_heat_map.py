@@ -279,7 +279,7 @@ def test_colours_wait_for_a_point_buffer_that_is_empty():
     bpy.context.scene.frame_set(8)
     before = shown_colours(obj)
     depsgraph = bpy.context.evaluated_depsgraph_get()
-    pairs = session.states_of([obj], depsgraph)
+    pairs = session.deformed_now([obj], depsgraph)
     properties.of(obj).storage.point_buffer.data.clear_geometry()
     heat_map.update(pairs, depsgraph)
     scenes.rebind(obj)

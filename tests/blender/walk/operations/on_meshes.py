@@ -198,7 +198,7 @@ def separate(w: Walker, r: random.Random) -> None:
     bmesh.update_edit_mesh(obj.data)
     bpy.ops.mesh.separate(type="SELECTED")
     bpy.ops.object.mode_set(mode="OBJECT")
-    made = next(o for o in bpy.data.objects if o not in before and not w.side.may_react(o))
+    made = next(o for o in bpy.data.objects if o not in before and not w.side.is_helper(o))
     made.name, made.data.name = w.new_name("object"), w.new_name("mesh")
 
 

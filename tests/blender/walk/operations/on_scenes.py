@@ -43,7 +43,7 @@ def simplify(w: Walker, r: random.Random) -> None:
 def edit_elsewhere(w: Walker, r: random.Random) -> None:
     """Edits an object of a scene that no window shows, and evaluates that."""
     others = [scene for scene in bpy.data.scenes if scene != bpy.context.scene]
-    found = [o for scene in others for o in scene.objects if o.type == "MESH" and not w.side.may_react(o)]
+    found = [o for scene in others for o in scene.objects if o.type == "MESH" and not w.side.is_helper(o)]
     obj = w.one(r, sorted(found, key=lambda o: o.name_full))
     w.skip_if(obj.library is not None or obj.data.library is not None or obj.data.is_editmode)
     for index in r.sample(range(len(obj.data.vertices)), min(3, len(obj.data.vertices))):
