@@ -150,6 +150,15 @@ class Layout:
         return viewport, render
 
     @property
+    def icons_in_this_frame(self) -> tuple[Icons, Icons]:
+        """As icons, but animated ones are as Blender has set them for this frame."""
+        own = self.own_icons
+        viewport, render = (
+            Icons(own[view], tuple(skin.shown[view] for skin in self.skins)) for view in range(2)
+        )
+        return viewport, render
+
+    @property
     def deforms(self) -> bool:
         """Whether Sinew deforms it in one of the views while it is on."""
         return any(icons.deformer is Deformer.SINEW for icons in self.icons)

@@ -160,7 +160,7 @@ def icons_of(
     if own.show_in_editmode:
         # in_depsgraph.py has switched them since Blender copied them.
         left_out = skinned.left_out.get(evaluated.as_pointer())
-        return skinned.noted.layout.icons if left_out is None else left_out.icons
+        return skinned.noted.layout.icons_in_this_frame if left_out is None else left_out.icons
     replaced = [evaluated.modifiers[each.name] for each, _armature in modifiers]
     viewport, render = (
         Icons(getattr(own, icon), tuple(getattr(modifier, icon) for modifier in replaced)) for icon in ICONS

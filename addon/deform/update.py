@@ -322,6 +322,9 @@ class _Event:
             skinned.evaluation.is_only_user = True
         # After Sinew's driver is added, as the driver counts as animation, too.
         skinned.noted = Noted.of(obj, self.layout, new, skinned.bound)
+        if not new.is_in_depsgraph:
+            # Animation may have set other icons in a copy that was not made anew: those of the object count.
+            skinned.left_out.clear()
         skinned.needs_plan = False
         if self.changes.frame and self.depsgraph.mode == "RENDER":
             # Applying the plan can have Blender copy the object again: what the frame has set is set again.
