@@ -213,9 +213,7 @@ def no_size(w: Walker, r: random.Random) -> None:
         bpy.context.view_layer.update()
         w.side.wait()
         # What is simulated depends on other frames, without Sinew, too.
-        shown = [
-            o for o in w.meshes() if w.side.has_sinew(o) and o.visible_get() and o.rigid_body is None
-        ]
+        shown = [o for o in w.meshes() if w.side.has_sinew(o) and o.visible_get() and o.rigid_body is None]
         found.append([w.shown_points(each) for each in shown])
     for each, *points in zip(shown, *found, strict=True):
         if not np.array_equal(*points, equal_nan=True):
