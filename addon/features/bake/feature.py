@@ -75,6 +75,8 @@ class SINEW_OT_bake(OnSinewObjects, stepped.IntoFolder, stepped.WithDialog, bpy.
             if name == "helpers" and not self.helpers:
                 counts = ", ".join(str(2 * count) for count in self.joints)
                 draw_text(layout, "Two a joint: {count}", pixels=stepped.DIALOG, count=counts)
+            if name == "error" and not self.error:
+                draw_text(layout, "All of them, whatever the error", pixels=stepped.DIALOG)
         if self.kind not in FILES:
             text = "Takes Sinew off: what is baked plays without it"
             draw_text(layout, text, icon="INFO", pixels=stepped.DIALOG)
