@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Mapping, Sequence
+from collections.abc import Generator, Mapping, Sequence
 from pathlib import Path
 from types import MappingProxyType
 from typing import TYPE_CHECKING
@@ -183,7 +183,7 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
     if args.variants is None:
         rows = _without_repeats(rows)
     console.note_on(path, characters.sentences())
-    joints, size = contact_sheet.columns(meshes), args.size or 240
+    joints, size = contact_sheet.columns(meshes), args.size or contact_sheet.SIZE
     labels = [title_of(each, row.values()) for each, row in rows.items()]
     sheet = Sheet(path.stem, labels, contact_sheet.headings(joints), is_difference=args.difference)
     count = len(rows) * len(joints)
@@ -197,10 +197,7 @@ def _write_sheet(path: Path, args: argparse.Namespace, console: Console) -> bool
     if args.viewer is not None:
         of_keys = {each.key: row for each, row in rows.items()}
         steps = motion_page.page(bpy.context.scene, sheet, joints, of_keys, size, left_out)
-        with console.bar(f"Posing {path.name}", len(joints)) as show:
-            text = result_of(steps, show)
-        write_text(args.viewer, text)
-        console.say(str(args.viewer))
+        _save_page(steps, f"Posing {path.name}", len(joints), args.viewer, console)
     return not left_out
 
 
@@ -303,13 +300,19 @@ def _write_page(
     attached = viewer.attached_to(scene, meshes)
     of_each = dict.fromkeys(meshes, ())
     steps = viewer.page(scene, path.stem, of_each, attached, methods, frames, left_out, variants=variants)
-    with console.bar(f"Reading {path.name}", len(frames)) as show:
-        text = result_of(steps, show)
     for reason in left_out:
         console.complain(f"{path}: left out: {reason}")
-    write_text(args.viewer, text)
-    console.say(str(args.viewer))
+    _save_page(steps, f"Reading {path.name}", len(frames), args.viewer, console)
     return not left_out
+
+
+def _save_page(
+    steps: Generator[float, None, str], doing: str, count: int, page_to: Path, console: Console
+) -> None:
+    with console.bar(doing, count) as show:
+        text = result_of(steps, show)
+    write_text(page_to, text)
+    console.say(str(page_to))
 
 
 def _compare(

@@ -14,13 +14,12 @@ from ...attach.feature import Feature
 from ...base.errors import SinewError
 from ...skinning.variants import Variant
 from ...ui import character, stepped
-from ...ui.operators import OnSinewObjects, armatures
-from ...ui.sidebar import names_text
+from ...ui.operators import OnSinewObjects
 from ...ui.translations import counted, tr
 from ..pages import contact_sheet, sheet_picture
-from ..pages.sheet import Cell, Sheet
+from ..pages.sheet import Cell
 from ..pages.sheet_layout import Hit, Layout, Panned
-from ..variants import choices, keys
+from ..variants import keys
 from . import look, overlay, rows
 from .save import SINEW_OT_save_contact_sheet
 
@@ -58,7 +57,7 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
     size: bpy.props.IntProperty(
         name="Size",
         description="Pixels of each picture in the image; over the view they fit",
-        default=240,
+        default=contact_sheet.SIZE,
         min=64,
         max=1024,
     )
@@ -122,9 +121,7 @@ class SINEW_OT_contact_sheet(OnSinewObjects, bpy.types.Operator):
         self.rows: Sequence[Variant] = rows.rows(context, self.variants)
         self.of_meshes = rows.of_meshes(context, self.rows)
         self.joints = rows.joints(context)
-        names = [obj.name for obj in armatures(context)]
-        labels, headings = list(map(choices.label, self.rows)), contact_sheet.headings(self.joints)
-        self.sheet = Sheet(names_text(names), labels, headings, is_difference=self.difference)
+        self.sheet = rows.sheet(context, self.rows, self.joints, self.difference)
 
     def _cells(self, size: int) -> Iterator[Cell]:
         return contact_sheet.cells(self.joints, self.of_meshes, size)

@@ -11,8 +11,10 @@ from ...base.errors import SinewError
 from ...deform import session
 from ...skinning.variants import BLENDER, FILE, WHOLE, Variant, named, parse_list
 from ...ui import character
-from ...ui.operators import sinew_targets
-from ..pages.contact_sheet import Bent, columns
+from ...ui.operators import armatures, sinew_targets
+from ...ui.sidebar import names_text
+from ..pages.contact_sheet import Bent, columns, headings
+from ..pages.sheet import Sheet
 from ..variants import choices
 
 
@@ -51,6 +53,17 @@ def joints(context: bpy.types.Context) -> list[Bent]:
         raise SinewError("Leave edit mode first")
     with switched_on(context):
         return columns(meshes)
+
+
+def sheet(
+    context: bpy.types.Context,
+    variants: Sequence[Variant],
+    bent: Sequence[Bent],
+    is_difference: bool = False,
+) -> Sheet:
+    """Returns one without pictures."""
+    title, labels = names_text([obj.name for obj in armatures(context)]), list(map(choices.label, variants))
+    return Sheet(title, labels, headings(bent), is_difference=is_difference)
 
 
 @contextmanager

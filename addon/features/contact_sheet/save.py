@@ -7,16 +7,10 @@ from collections.abc import Generator
 
 import bpy
 
-from ...ui.operators import OnSinewObjects, armatures
-from ...ui.sidebar import names_text
+from ...ui.operators import OnSinewObjects
 from ..pages import contact_sheet, motion_page
 from ..pages.save import SavesPage
-from ..pages.sheet import Sheet
-from ..variants import choices
 from . import rows
-
-# Pixels of a picture, as it is drawn.
-SIZE = 240
 
 
 class SINEW_OT_save_contact_sheet(OnSinewObjects, SavesPage, bpy.types.Operator):
@@ -29,12 +23,11 @@ class SINEW_OT_save_contact_sheet(OnSinewObjects, SavesPage, bpy.types.Operator)
     saying = "Sinew draws the sheet and reads the poses of the page"
     usual_name = "sheet"
 
-    def page(self, context: bpy.types.Context, title: str) -> Generator[float, None, str]:
+    def page(self, context: bpy.types.Context, _title: str) -> Generator[float, None, str]:
         variants = rows.rows(context, "")
         of_meshes = rows.of_meshes(context, variants)
         with rows.switched_on(context):
             joints = rows.joints(context)
-            labels, headings = list(map(choices.label, variants)), contact_sheet.headings(joints)
-            sheet = Sheet(names_text([obj.name for obj in armatures(context)]) or title, labels, headings)
+            sheet = rows.sheet(context, variants, joints)
             keys = dict(zip([each.key for each in variants], of_meshes, strict=True))
-            return (yield from motion_page.page(context.scene, sheet, joints, keys, SIZE))
+            return (yield from motion_page.page(context.scene, sheet, joints, keys, contact_sheet.SIZE))

@@ -15,8 +15,6 @@ from . import flex
 from .report import headline
 from .verdict import Finding, Joint
 
-AT_REST = "At rest"
-
 
 def page(
     scene: bpy.types.Scene,
@@ -32,7 +30,7 @@ def page(
     Raises SinewError where no mesh can be shown, and where a bone is gone.
     """
     methods = list(dict.fromkeys([*result.own.values(), *(result.methods or METHODS)]))
-    poses, numbers = [viewer.Pose(AT_REST)], {}
+    poses, numbers = [viewer.Pose(viewer.AT_REST)], {}
     for (armature, joint, name), rotations in result.poses.items():
         rig = scene.objects.get(armature)
         if rig is None or rig.type != "ARMATURE" or not {joint, *rotations} <= set(rig.data.bones.keys()):

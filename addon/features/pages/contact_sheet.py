@@ -27,6 +27,8 @@ from . import shaded
 from .sheet import Cell
 from .views import View, joint_view
 
+# Pixels of a picture, where nobody says otherwise.
+SIZE = 240
 # How far around a joint a picture shows, in mean lengths of the two limbs that meet there.
 REACH = 1.0
 # A joint that bends less of the surface than this share of all is not worth a column.

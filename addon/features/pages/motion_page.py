@@ -21,7 +21,6 @@ from .sheet import Sheet
 from .sheet_layout import Layout
 from .viewer_page import PageSheet, Place
 
-AT_REST = "At rest"
 # The share of the time that drawing the sheet takes.
 DRAWING = 0.7
 # About so many pixels has a picture in the page.
@@ -91,7 +90,7 @@ def _picture(sheet: Sheet, size: int, ticks: Sequence[str]) -> bytes:
 def _poses(joints: Sequence[Bent]) -> tuple[list[viewer.Pose], list[Place]]:
     """Returns the character at rest, its range of motion and what the sheet has else; and where each joint of
     the sheet is in it."""
-    poses, places = [viewer.Pose(AT_REST)], []
+    poses, places = [viewer.Pose(viewer.AT_REST)], []
     for rig in joints[0].rigs:
         limits = armature_io.read_limits(rig.armature)
         own = motion_range.poses(rig.bones, limits, rig.is_moving)

@@ -40,6 +40,8 @@ from .viewer_page import BLENDER, METHODS, MIX, Form, Found, Look, PageSheet, Pa
 # The method of meshes that have none of their own; any of Sinew's would do.
 PLAYED = "dq"
 POSES_A_SECOND = 1.0
+# A pose's name.
+AT_REST = "At rest"
 # The stages that the shaders have, each with the parameter of its strength.
 STRENGTHS = {"twist_spread": "amount", "bulge_limit": "strength"}
 SMOOTHING = "delta_mush"
