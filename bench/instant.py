@@ -25,9 +25,13 @@ ROUNDS = 12
 Step = Callable[[int], None]
 
 
-def least(step: Step, rounds: int = ROUNDS) -> float:
+def least(step: Step, rounds: int = ROUNDS, before: Callable[[], None] | None = None) -> float:
+    """before: what is done before each step, and not timed"""
     times = []
     for number in range(rounds):
+        if before is not None:
+            before()
+            bpy.context.view_layer.update()
         start = time.perf_counter()
         step(number)
         bpy.context.view_layer.update()
@@ -80,12 +84,15 @@ def measure(vertices: int, with_sinew: bool) -> dict[str, float]:
             # What they need computed is there.
             obj.sinew.method = method
             scene.frame_set(scene.frame_current)
-        each = [
-            least(lambda _n, m=m, before=before: setattr(obj.sinew, "method", m if _n % 2 else before))
-            for before, m in zip(METHODS, (*METHODS[1:], METHODS[0]), strict=True)
-        ]
-        found["flip"] = round(sum(each) / len(each), 2)
-        found["flip to cor"] = each[METHODS.index("cor") - 1]
+        each = {
+            method: least(
+                lambda _number, m=method: setattr(obj.sinew, "method", m),
+                before=lambda m=method: setattr(obj.sinew, "method", "lbs" if m != "lbs" else "dq"),
+            )
+            for method in METHODS
+        }
+        found["flip"] = round(sum(each.values()) / len(each), 2)
+        found["flip to cor"] = each["cor"]
         obj.sinew.method = "dq"
         found["Off, On"] = least(lambda number: setattr(obj.sinew, "enabled", number % 2 == 1))
     else:

@@ -19,13 +19,13 @@ from ..io import armature_io, spaces
 from ..io.actions import animated_paths
 from ..skinning import sdef
 from ..skinning.arrays import are_equal
-from ..skinning.rig import Bones, RigFacts, Weighting
+from ..skinning.rig import Bones, Weighting
 from ..skinning.shading import GivenNormals
 from ..skinning.skin_stack import ModifierSkin, SkinDeformer, SkinStack
 from ..skinning.stage_mesh import StageMesh
 from ..skinning.stages import StagesAfter
 from ..skinning.vertex_data import VertexData
-from . import source, survey
+from . import source
 from .source import Source
 
 
@@ -38,7 +38,6 @@ class Bound:
     options     of each Armature modifier
     source      rest points and weights
     skin_stack  deforms them: one stage for each Armature modifier, then those of the library's list
-    facts       about mesh and rig, for the panel
     groups      the vertex group of each stage of the library's list that has one, by the stage's name
     """
 
@@ -46,7 +45,6 @@ class Bound:
     options: list[ModifierOptions]
     source: Source
     skin_stack: SkinStack
-    facts: RigFacts
     groups: dict[str, str]
 
     def is_of_another_stack(self, other: Bound | None) -> bool:
@@ -115,22 +113,33 @@ class Bound:
 
 
 def read(
-    obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, now: Layout, old: Bound | None = None
+    obj: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    now: Layout,
+    old: Bound | None = None,
+    has_same_bones: bool = False,
 ) -> Bound:
     """Reads the object. Binds again only what has changed; the skin stack is the old one where modifiers,
-    bones and weights have not.
+    bones and weights have not. Returns `old` itself where nothing has.
 
-    now  the object's layout
-    old  given where neither modifiers nor their options changed since
+    now             the object's layout
+    old             given where neither modifiers nor their options changed since
+    has_same_bones  its armatures are known to have the bones of `old`
 
     Requires source.is_ready().
     """
-    read_now = source.read(obj, depsgraph, needs_surface(obj))
-    pairs = attach.replaced_modifiers(obj, now)
-    bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
+    read_now = source.read(obj, depsgraph, needs_surface(obj), None if old is None else old.source)
     groups = stage_settings.vertex_groups(properties.of(obj))
-    if old is not None:
-        read_now.take_what_equals(old.source)
+    if old is not None and has_same_bones and read_now is old.source and old.groups == groups:
+        return old
+    pairs = attach.replaced_modifiers(obj, now)
+    known = (
+        [] if old is None or not has_same_bones else [skin.deformer.bones for skin in old.skin_stack.skins]
+    )
+    if len(known) == len(pairs) and all(each.skin is None for each in known):
+        bones = known
+    else:
+        bones = [_read_bones(replaced.armature, depsgraph) for _modifier, replaced in pairs]
     spaces_now = [_bones_from_model(obj, replaced.armature, depsgraph) for _modifier, replaced in pairs]
     if old is not None and old.groups == groups and _equals_but_for_points(old, read_now, bones, spaces_now):
         return replace(old, source=read_now)
@@ -141,21 +150,19 @@ def read(
     for option, its_bones, space, its_old in itertools.zip_longest(options, bones, spaces_now, before):
         if option is None:
             break
-        known = None if its_old is None else its_old.deformer.bones
-        if known is not None and known.skin is None and its_bones.equals(known):
+        its_known = None if its_old is None else its_old.deformer.bones
+        if its_known is not None and its_known.skin is None and its_bones.equals(its_known):
             # With all that was made of them.
-            its_bones = known
+            its_bones = its_known
         weighting = option.weighting(read_now.group_names, read_now.weights, its_bones)
         weighting = weighting.with_skin(read_now.surface_points, space)
         deformer = SkinDeformer(weighting, masks.get("mix"), _vertex_data(weighting, read_now, its_old))
         skins.append(
             ModifierSkin(deformer, option.mask_weights(read_now.group_names, read_now.weights), option.multi)
         )
-    weighting = skins[0].deformer.weighting
-    facts = survey.describe(obj, now, pairs[0][1].armature, weighting, read_now.points, depsgraph)
     armatures = [uid(replaced.armature) for _modifier, replaced in pairs]
     skin_stack = SkinStack(skins, StagesAfter(_stage_mesh(read_now, skins), masks))
-    return Bound(armatures, options, read_now, skin_stack, facts, groups)
+    return Bound(armatures, options, read_now, skin_stack, groups)
 
 
 def _vertex_data(weighting: Weighting, read_now: Source, before: ModifierSkin | None) -> VertexData:

@@ -27,6 +27,7 @@ from ..attach.layout import Layout
 from ..base.errors import SinewError
 from ..io import armature_io, mesh_io
 from ..io.actions import animated_paths
+from ..skinning.rig import RigFacts
 from ..skinning.skin_stack import NO_STAGES, ModifierFrame
 from ..skinning.stages import StageValues
 from . import small_meshes
@@ -251,6 +252,7 @@ class SkinnedObject:
     needs_plan     a new plan has to be made at the next event
     needs_recheck  the mesh may have changed since it was read: it is read again at the next event, or when it
                    is measured
+    facts          as from survey.facts_of(); None until it is asked for
     """
 
     bound: Bound
@@ -265,6 +267,7 @@ class SkinnedObject:
     needs_plan: bool = False
     group_losses: int = 0
     needs_recheck: bool = False
+    facts: RigFacts | None = None
 
     @property
     def has_new_data(self) -> bool:
@@ -273,9 +276,12 @@ class SkinnedObject:
 
     def bind(self, bound: Bound) -> None:
         """Sets what the object is deformed by. Drops the shape where modifiers, bones or weights changed."""
+        if bound is self.bound:
+            return
         with self.lock:
             if bound.is_of_another_stack(self.bound):
                 self.shown, self.evaluation = Shown(number=self.shown.number), Evaluation()
+                self.facts = None
             bound.take_over(self.bound)
             self.bound = bound
 

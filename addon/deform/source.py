@@ -19,8 +19,8 @@ from ..skinning.shape_keys import ShapeKeys
 from ..skinning.stage_mesh import Topology
 from .changes import Changes
 
-# What is compared beside group names and weights.
-_COMPARED = ("points", "mesh_points", "triangles", "sdef_keys", "topology", "shading", "shape_keys")
+# What is read each time.
+_READ = ("weights", "points", "mesh_points", "sdef_keys", "topology", "shading", "shape_keys")
 
 
 @dataclass
@@ -76,7 +76,9 @@ class Source:
         return self.points if self.own_points is None else self.own_points
 
     def equals(self, other: Source) -> bool:
-        return self is other or (self.has_same_weights(other) and self._has_same(other, *_COMPARED))
+        return self is other or (
+            self.group_names == other.group_names and self._has_same(other, *_READ, "triangles")
+        )
 
     def has_same_weights(self, other: Source) -> bool:
         return self.group_names == other.group_names and self._has_same(other, "weights")
@@ -118,12 +120,23 @@ class Source:
         return len(self.points if domain == "POINT" else self.topology.corner_vertices)
 
     def take_what_equals(self, other: Source) -> None:
-        """Takes over the other's arrays that equal these. So later comparisons cost nothing, and an identical
-        array signals that nothing moved."""
-        for name in ("weights", *_COMPARED):
+        """Takes over the other's arrays that equal these, and triangles of the same faces. So later
+        comparisons cost nothing, and an identical array signals that nothing moved."""
+        for name in _READ:
             if self._has_same(other, name):
                 setattr(self, name, getattr(other, name))
+        # From upstream, it is not known whether the object's own mesh has the same faces.
+        has_same_faces = self.topology is other.topology and self.points is other.points
+        if has_same_faces and self.mesh == other.mesh and not (self.from_upstream or other.from_upstream):
+            self.triangles, self.stored = other.triangles, other.stored
         self.keep_normals_of(other)
+
+    def is_still(self, other: Source) -> bool:
+        """Whether all of the other was taken over."""
+        plain = ("group_names", "mesh", "from_upstream", "normals_domain")
+        return all(getattr(self, name) is getattr(other, name) for name in (*_READ, "triangles")) and all(
+            getattr(self, name) == getattr(other, name) for name in plain
+        )
 
     def keep_normals_of(self, other: Source) -> None:
         """Takes over the prepared normals of the other, where these are the same."""
@@ -140,27 +153,42 @@ def is_ready(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, was_on: bool
     return was_on and upstream_proxy.evaluated_mesh(obj, depsgraph) is not None
 
 
-def read(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, with_surface: bool = False) -> Source:
+def read(
+    obj: bpy.types.Object,
+    depsgraph: bpy.types.Depsgraph,
+    with_surface: bool = False,
+    known: Source | None = None,
+) -> Source:
     """Requires is_ready().
 
     with_surface  with the triangles, and with the stored data that was computed from them
+    known         what was read of the object before: returned itself where it is still the same; else all
+                  that is the same is taken from it
     """
     names = _group_names(obj, depsgraph)
     from_upstream = properties.of(obj).storage.upstream_proxy is not None
     mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if from_upstream else obj.data
-    weights = mesh_io.read_group_weights(mesh)
-    points = _finite(mesh_io.read_points(mesh))
-    mesh_points = _finite(mesh_io.read_points(obj.data)) if from_upstream else points
+    weights = mesh_io.read_group_weights(mesh, known and known.weights)
+    points = _finite(mesh_io.read_points(mesh, known and known.points))
+    mesh_points = points
+    if from_upstream:
+        mesh_points = _finite(mesh_io.read_points(obj.data, known and known.mesh_points))
     keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if len(mesh_points) != len(points):
         sdef_keys = None
-    topology = mesh_io.read_topology(mesh)
-    shading = mesh_io.read_shading(mesh)
+    topology = mesh_io.read_topology(mesh, known and known.topology)
+    shading = mesh_io.read_shading(mesh, known and known.shading)
     domain = normals.domain_of(mesh)
     surface = (points, None, topology, mesh_points, obj.data.session_uid)
     source = Source(names, weights, *surface, keys, sdef_keys, shading, from_upstream, domain)
-    return _with_surface(obj, mesh, source) if with_surface else source
+    if known is not None:
+        source.take_what_equals(known)
+    if source.triangles is None and with_surface:
+        source = _with_surface(obj, mesh, source)
+        if known is not None and are_equal(source.triangles, known.triangles):
+            source.triangles = known.triangles
+    return known if known is not None and source.is_still(known) else source
 
 
 def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, known: Source) -> Source:
@@ -256,8 +284,8 @@ def _finite(points: np.ndarray) -> np.ndarray:
 
 
 def _upstream_points(mesh: bpy.types.Mesh, source: Source) -> np.ndarray:
-    points = _finite(mesh_io.read_points(mesh))
-    if not np.array_equal(points, source.points):
+    points = _finite(mesh_io.read_points(mesh, source.points))
+    if not are_equal(points, source.points):
         source.points = points
     return source.points
 

@@ -13,9 +13,20 @@ from ..io import armature_io, mesh_io, spaces
 from ..skinning import sdef
 from ..skinning.rig import RigFacts, Weighting, describe_rig
 from ..skinning.vectors import transformed
+from .skinned_object import SkinnedObject
 
 
-def describe(
+def facts_of(obj: bpy.types.Object, skinned: SkinnedObject) -> RigFacts:
+    """Returns facts and warnings about a mesh that was read. They are found when somebody asks, so that no
+    edit waits for them, and kept until it is bound anew."""
+    if skinned.facts is None:
+        armature, deformer = properties.of(obj).armature, skinned.bound.first_deformer
+        points, depsgraph = skinned.bound.source.points, bpy.context.view_layer.depsgraph
+        skinned.facts = _describe(obj, layout.read(obj), armature, deformer.weighting, points, depsgraph)
+    return skinned.facts
+
+
+def _describe(
     obj: bpy.types.Object,
     now: Layout,
     armature: bpy.types.Object | None,
@@ -96,7 +107,7 @@ def describe_in_file(obj: bpy.types.Object) -> RigFacts:
     weighting = options.weighting(obj.vertex_groups.keys(), weights, bones)
     points = mesh_io.read_points(obj.data)
     now = layout.read(obj)
-    return describe(obj, now, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
+    return _describe(obj, now, armature, weighting, points, depsgraph).with_warnings(_obstacles(obj))
 
 
 def _obstacles(obj: bpy.types.Object) -> list[str]:

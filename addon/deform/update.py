@@ -64,6 +64,7 @@ class _Event:
 
     seen              its layout; None where it has to be read
     plan, is_planned  its plan now, and whether that was made in this event
+    is_applied        and whether it was applied: one that stays need not be
     is_read           whether any of what was read of it was read again
     inputs            how it differed from that
     is_copy_outdated  the upstream proxy's copy of the mesh has to be made again
@@ -78,6 +79,7 @@ class _Event:
     depsgraph: bpy.types.Depsgraph
     changes: Changes
     is_planned: bool = False
+    is_applied: bool = False
     is_read: bool = False
     is_copy_outdated: bool = False
     is_rescaled: bool = False
@@ -215,19 +217,22 @@ class _Event:
         if new.is_read:
             self.seen = _check_modifiers(self.obj, self.layout, self.changes)
             new = self._full_plan()
-        if not self._is_applied(facts, new):
+        self.is_applied = not self._stays(facts, new)
+        if self.is_applied:
             apply_plan.apply(self.obj, self.layout, self.old, new)
             self.seen = None
         self.plan, self.is_planned = new, True
 
-    def _is_applied(self, facts: Facts, new: Plan) -> bool:
-        """Whether the plan stays, and so does what it was applied to: choosing a method changes no
-        modifier."""
+    def _stays(self, facts: Facts, new: Plan) -> bool:
+        """Whether the plan stays, and so does what it was applied to: choosing a method changes no modifier,
+        and most undo steps change nothing of the object."""
         skinned, obj = self.skinned, self.obj
         if skinned is None or new != self.old or not new.is_in_depsgraph:
             return False
-        is_only_due = facts.is_due and not replace(facts, is_due=False).calls_for_plan
-        return is_only_due and skinned.is_as_noted(obj, self.layout) and skinned.has_same_surroundings(obj)
+        may_stay = replace(facts, is_due=False, is_other=facts.is_other and not self.changes.after_step)
+        if may_stay.calls_for_plan or not skinned.is_as_noted(obj, self.layout):
+            return False
+        return skinned.has_same_surroundings(obj)
 
     def _full_plan(self) -> Plan:
         failure = ""
@@ -266,7 +271,8 @@ class _Event:
             skinned.bind(bound.with_surface(obj, depsgraph, skinned.bound))
         elif reading is not Reading.NOTHING:
             old = skinned.bound if reading is Reading.CHANGED else None
-            skinned.bind(bound.read(obj, depsgraph, self.layout, old))
+            has_same_bones = not self.inputs.have_bones_changed
+            skinned.bind(bound.read(obj, depsgraph, self.layout, old, has_same_bones))
         self.is_read = reading is not Reading.NOTHING
 
     def settle(self, facts: Facts) -> None:
@@ -282,16 +288,18 @@ class _Event:
         is_same &= not (skinned.has_new_data or self.is_rescaled)
         is_new_plan = self.bound_before is None or not new.gives_as(self.old)
         self.differs = facts.was_skipped or facts.lacks_points or not is_same or is_new_plan
-        if self.is_planned or is_of_another_stack:
+        if self.is_applied:
             self._note(new)
         else:
-            if self.is_read and new.is_in_depsgraph:
-                # Another add-on may have removed it since the last evaluation.
+            if (self.is_read and new.is_in_depsgraph) or (is_of_another_stack and not new.uses_builtin):
+                # Other bones may move it, and another add-on may have removed the driver.
                 apply_plan.apply_driver(obj, self.layout, skinned.bound, new)
-            skinned.needs_plan |= facts.calls_for_plan
+            waits = skinned.needs_plan or facts.calls_for_plan
+            skinned.needs_plan = waits and not self.is_planned
             noted, versions = skinned.noted, skinned.bound.data_versions
+            volume = obj.matrix_world.determinant() if self.is_rescaled else noted.volume
             skinned.noted = replace(
-                noted, layout=replace(noted.layout, mode=obj.mode), data_versions=versions
+                noted, layout=replace(noted.layout, mode=obj.mode), data_versions=versions, volume=volume
             )
         skinned.plan = new
         if new.is_in_depsgraph:

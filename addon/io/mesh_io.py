@@ -3,7 +3,6 @@
 attribute."""
 
 import ctypes
-import functools
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from itertools import chain
@@ -16,7 +15,7 @@ import sinew
 
 from ..base.errors import SinewError
 from ..skinning import sdef
-from ..skinning.arrays import read
+from ..skinning.arrays import are_equal, memory_of, read
 from ..skinning.influences import GroupWeights
 from ..skinning.shading import Shading
 from ..skinning.shape_keys import ShapeKeys
@@ -28,7 +27,7 @@ from . import mesh_memory
 # vertices' "co".
 POSITION = "position"
 SHARP_EDGES, SHARP_FACES, CUSTOM_NORMALS = "sharp_edge", "sharp_face", "custom_normal"
-_VECTOR_BYTES, _OFFSET_BYTES = 3 * np.dtype(np.float32).itemsize, np.dtype(np.int32).itemsize
+_OFFSET_BYTES = np.dtype(np.int32).itemsize
 
 
 def find_attribute(mesh: bpy.types.Mesh, name: str) -> bpy.types.Attribute | None:
@@ -57,12 +56,28 @@ def corner_normals(mesh: bpy.types.Mesh) -> np.ndarray:
     return read(mesh.corner_normals, "vector", 3)
 
 
-def read_points(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Returns vertex positions in object space, float32 [vertices, 3]; a copy."""
+# The functions that take `known`, what was read before, return it itself where it is still the same. They
+# compare it in place: copying takes several times as long.
+
+
+def _values(
+    attribute: bpy.types.Attribute, name: str, width: int, kind: type, known: np.ndarray | None
+) -> np.ndarray:
+    """Returns all values of an attribute; a copy, or `known`."""
+    memory = memory_of(attribute.data, width, kind)
+    return read(attribute.data, name, width, kind) if memory is None else _kept(memory, known)
+
+
+def _kept(memory: np.ndarray, known: np.ndarray | None) -> np.ndarray:
+    return known if known is not None and are_equal(memory, known) else memory.copy()
+
+
+def read_points(mesh: bpy.types.Mesh, known: np.ndarray | None = None) -> np.ndarray:
+    """Returns vertex positions in object space, float32 [vertices, 3]; a copy, or `known`."""
     # In edit mode a mesh has no attributes, and without vertices it may have none.
     attribute = None if mesh.is_editmode else find_attribute(mesh, POSITION)
     if attribute is not None and len(attribute.data) == len(mesh.vertices):
-        return read(attribute.data, "vector", 3)
+        return _values(attribute, "vector", 3, np.float32, known)
     return read(mesh.vertices, "co", 3)
 
 
@@ -94,38 +109,42 @@ def read_surface(mesh: bpy.types.Mesh) -> Surface:
     return Surface(len(mesh.vertices), triangles, edges, coincident_vertices(read_points(mesh)))
 
 
-def read_topology(mesh: bpy.types.Mesh) -> Topology:
+def read_topology(mesh: bpy.types.Mesh, known: Topology | None = None) -> Topology:
+    offsets, corners, edges = (
+        (None, None, None) if known is None else (known.face_offsets, known.corner_vertices, known.edges)
+    )
     # Reading whole attributes takes a hundredth of the time.
     of_corners, of_edges = (
         None if mesh.is_editmode else find_attribute(mesh, name) for name in (".corner_vert", ".edge_verts")
     )
     if of_corners is not None and of_edges is not None:
-        corners = read(of_corners.data, "value", kind=np.int32)
-        edges = read(of_edges.data, "value", 2, np.int32)
+        corners = _values(of_corners, "value", 1, np.int32, corners)
+        edges = _values(of_edges, "value", 2, np.int32, edges)
     else:
         corners, edges = corner_vertices(mesh), read(mesh.edges, "vertices", 2, np.int32)
-    return Topology(read_face_offsets(mesh), corners, edges)
+    return Topology(read_face_offsets(mesh, offsets), corners, edges)
 
 
-def read_face_offsets(mesh: bpy.types.Mesh) -> np.ndarray:
-    """Returns int32 [faces + 1]: the first corner of each face, then the end."""
+def read_face_offsets(mesh: bpy.types.Mesh, known: np.ndarray | None = None) -> np.ndarray:
+    """Returns int32 [faces + 1]: the first corner of each face, then the end; a copy, or `known`."""
     faces, corners = mesh.polygons, len(mesh.loops)
     count = len(faces)
     # A face is its offset in Blender's array (4.0 to 5.3). "loop_start" takes a hundred times as long.
     first = faces[0].as_pointer() if count else 0
     if count and faces[count - 1].as_pointer() - first == (count - 1) * _OFFSET_BYTES:
-        offsets = np.ctypeslib.as_array((ctypes.c_int32 * (count + 1)).from_address(first)).copy()
+        offsets = np.ctypeslib.as_array((ctypes.c_int32 * (count + 1)).from_address(first))
         if offsets[0] == 0 and offsets[count] == corners:
-            return offsets
+            return _kept(offsets, known)
     return np.append(read(faces, "loop_start", kind=np.int32), np.int32(corners))
 
 
-def read_shading(mesh: bpy.types.Mesh) -> Shading:
+def read_shading(mesh: bpy.types.Mesh, known: Shading | None = None) -> Shading:
     """Returns what the mesh's normals depend on, apart from its points."""
+    before = known or Shading()
     return Shading(
-        _read_flags(mesh, SHARP_EDGES, mesh.edges, "use_edge_sharp", shown_as=True),
-        _read_flags(mesh, SHARP_FACES, mesh.polygons, "use_smooth", shown_as=False),
-        _read_custom_normals(mesh),
+        _read_flags(mesh, SHARP_EDGES, mesh.edges, "use_edge_sharp", True, before.sharp_edges),
+        _read_flags(mesh, SHARP_FACES, mesh.polygons, "use_smooth", False, before.sharp_faces),
+        _read_custom_normals(mesh, before.custom),
     )
 
 
@@ -135,6 +154,7 @@ def _read_flags(
     elements: bpy.types.bpy_prop_collection,
     property_name: str,
     shown_as: bool,
+    known: np.ndarray | None,
 ) -> np.ndarray | None:
     """Returns bool [elements]; None where no flag is set.
 
@@ -146,17 +166,20 @@ def _read_flags(
         attribute = find_attribute(mesh, name)
         if attribute is None or attribute.data_type != "BOOLEAN":
             return None
-        flags = read(attribute.data, "value", kind=bool)
+        flags = _values(attribute, "value", 1, bool, known)
     return flags if flags.any() and len(flags) == len(elements) else None
 
 
-def _read_custom_normals(mesh: bpy.types.Mesh) -> np.ndarray | None:
+def _read_custom_normals(mesh: bpy.types.Mesh, known: np.ndarray | None) -> np.ndarray | None:
     """Returns int16 [corners, 2], as Blender stores them relative to the computed normals; None where there
     are none. Blender 4.5 and later."""
     attribute = None if mesh.is_editmode else find_attribute(mesh, CUSTOM_NORMALS)
     if attribute is None or attribute.data_type != "INT16_2D" or attribute.domain != "CORNER":
         return None
-    return read(attribute.data, "value", 2, np.int32).astype(np.int16)
+    memory = memory_of(attribute.data, 2, np.int16)
+    if memory is None:
+        return read(attribute.data, "value", 2, np.int32).astype(np.int16)
+    return _kept(memory, known)
 
 
 def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> None:
@@ -175,14 +198,15 @@ def restore_custom_normals(mesh: bpy.types.Mesh, custom: np.ndarray | None) -> N
     mesh.update()
 
 
-def read_group_weights(mesh: bpy.types.Mesh) -> GroupWeights:
+def read_group_weights(mesh: bpy.types.Mesh, known: GroupWeights | None = None) -> GroupWeights:
     """Returns all entries of all vertices, in stored order."""
     address = mesh_memory.address_of_groups(mesh)
     if address is None:
         return _read_groups_of(mesh.vertices)
     if address == 0:
         return GroupWeights.none(len(mesh.vertices))
-    return GroupWeights(*sinew.weights_in_memory(address, len(mesh.vertices)))
+    before = None if known is None else (known.counts, known.groups, known.weights)
+    return GroupWeights(*sinew.weights_in_memory(address, len(mesh.vertices), before))
 
 
 def read_edited_weights(edited: bmesh.types.BMesh) -> GroupWeights:
@@ -350,21 +374,8 @@ def vectors_in(evaluated_mesh: bpy.types.Mesh, name: str, domain: str = "POINT")
     attribute = attribute_to_write(evaluated_mesh, name)
     if not _is_of_vectors(attribute, domain):
         return None
-    values = attribute.data
-    count = len(values)
-    if count == 0 or count != domain_size(evaluated_mesh, domain):
-        return None
-    first, last = values[0].as_pointer(), values[count - 1].as_pointer()
-    if last - first != (count - 1) * _VECTOR_BYTES:
-        return None
-    return _vectors_at(first, count)
-
-
-@functools.lru_cache(maxsize=256)
-def _vectors_at(address: int, count: int) -> np.ndarray:
-    """Returns float32 [count, 3], an array on that memory, without ownership. Cached, as Blender reuses the
-    same memory for mesh after mesh, and the cache takes a tenth of the time of making the array."""
-    return np.ndarray((count, 3), np.float32, (ctypes.c_float * (3 * count)).from_address(address))
+    is_whole = len(attribute.data) == domain_size(evaluated_mesh, domain)
+    return memory_of(attribute.data, 3, np.float32) if is_whole else None
 
 
 def remove_attribute(mesh: bpy.types.Mesh, name: str) -> None:

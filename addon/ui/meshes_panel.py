@@ -5,7 +5,7 @@ import bpy
 
 from ..attach import properties
 from ..attach.feature import Feature
-from ..deform import session
+from ..deform import session, survey
 from . import character, operators, state_text
 from .settings_layout import draw_method, draw_parameters, draw_stages, named
 from .sidebar import Sidebar, characters, draw_text, shortened
@@ -106,7 +106,7 @@ def _draw_facts(layout: bpy.types.UILayout, obj: bpy.types.Object) -> None:
     armature, state = properties.of(obj).armature, session.skinned_of(obj)
     rows = [("Armature", armature.name if armature else tr("none"))]
     if state is not None:
-        facts = state.bound.facts
+        facts = survey.facts_of(obj, state)
         mean, weighted = f"{facts.mean_influences:.2f}", facts.weighted_bones
         rows += [
             ("Vertices", f"{facts.vertices:,}"),

@@ -7,7 +7,7 @@ import bpy
 
 from ..attach import attach, other_tools, properties
 from ..attach.icons import Deformer
-from ..deform import lifecycle, session, small_meshes
+from ..deform import lifecycle, session, small_meshes, survey
 from ..deform.plan import ARMATURE_MODIFIER_MODES, State
 from . import operators
 from .sidebar import draw_text, names_text
@@ -94,7 +94,7 @@ def problems_of(obj: bpy.types.Object) -> list[str]:
                 failure=tr(state.failures.last),
             )
         )
-    found += state.bound.facts.warnings
+    found += survey.facts_of(obj, state).warnings
     # Such a modifier may have been added since.
     return [*found, *(sentence for sentence in other_tools.warnings(obj) if sentence not in found)]
 

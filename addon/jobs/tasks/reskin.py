@@ -16,7 +16,7 @@ from ...attach.updates import updates_suspended
 from ...base.errors import SinewError
 from ...base.frames import parse_frames
 from ...base.names import fits
-from ...deform import characters, lifecycle, session
+from ...deform import characters, lifecycle, session, survey
 from ...features.compare import comparison
 from ...features.pages import render
 from ...features.pages.views import seen_extent, whole_view
@@ -128,7 +128,7 @@ def _use_sinew(
             "method": properties.of(obj).method,
             "scale": properties.of(obj).scale_rule,
             "warnings": [
-                *(state.bound.facts.warnings if state is not None else ()),
+                *(survey.facts_of(obj, state).warnings if state is not None else ()),
                 # What else deforms the mesh than Sinew, and what was found switched off.
                 *(*session.plan_of(obj).view_reasons, *attach.notes(obj)),
             ],

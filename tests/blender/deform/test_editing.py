@@ -16,9 +16,10 @@ import whole_file
 from sinew_addon.attach import attach, layout, modifier_types, other_tools, point_store, properties
 from sinew_addon.attach.updates import updates_suspended
 from sinew_addon.base.errors import SinewError
-from sinew_addon.deform import characters, in_depsgraph, safe_mode, session, survey, update
+from sinew_addon.deform import apply_plan, characters, in_depsgraph, safe_mode, session, survey, update
 from sinew_addon.deform.plan import State
 from sinew_addon.io import actions, armature_io, mesh_io
+from sinew_addon.skinning import vertex_data
 from sinew_addon.ui import state_text
 
 pytestmark = pytest.mark.both_ways
@@ -150,7 +151,7 @@ def test_hooks_behind_take_a_vertex_group(has_group):
     bpy.context.scene.frame_set(6)
     expected = scenes.final_points(obj)
     scenes.add_sinew(obj)
-    warnings = " ".join(session.skinned_of(obj).bound.facts.warnings)
+    warnings = " ".join(survey.facts_of(obj, session.skinned_of(obj)).warnings)
     is_equal = scenes.worst(scenes.final_points(obj), expected) <= 1e-5
     assert is_equal == has_group
     assert ("this Hook" in warnings) != has_group
@@ -325,7 +326,9 @@ def test_a_new_method_reads_only_changed_weights(monkeypatch):
     characters.use_method(obj, "dq")
     bpy.context.scene.frame_set(11)
     reads, read = [], mesh_io.read_group_weights
-    monkeypatch.setattr(mesh_io, "read_group_weights", lambda mesh: reads.append(mesh) or read(mesh))
+    monkeypatch.setattr(
+        mesh_io, "read_group_weights", lambda mesh, *known: reads.append(mesh) or read(mesh, *known)
+    )
     bpy.context.view_layer.update()
     reads.clear()
     for method in ("lbs", "qv", "dq"):
@@ -344,6 +347,43 @@ def test_a_new_method_reads_only_changed_weights(monkeypatch):
     expected = scenes.final_points(obj)
     characters.use_method(obj, "lbs")
     assert scenes.worst(scenes.final_points(obj), expected) <= scenes.TOLERANCE * scenes.diagonal(obj)
+
+
+@pytest.mark.by_sinew
+def test_the_surface_is_read_once_however_often_methods_are_chosen(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "cor")
+    made = [skin.deformer.vertex_data.made["cor"] for skin in session.skinned_of(obj).bound.skin_stack.skins]
+    monkeypatch.setattr(mesh_io, "read_triangles", None)
+    monkeypatch.setattr(vertex_data, "_key", None)
+    for method in ("lbs", "cor", "dq", "cor", "qv"):
+        obj.sinew.method = method
+        bpy.context.view_layer.update()
+        assert session.plan_of(obj).state is State.IN_DEPSGRAPH
+    skins = session.skinned_of(obj).bound.skin_stack.skins
+    assert all(
+        skin.deformer.vertex_data.made["cor"][1] is array
+        for skin, (_, array) in zip(skins, made, strict=True)
+    )
+
+
+@pytest.mark.by_sinew
+def test_an_undo_that_has_nothing_to_do_with_it_applies_nothing(monkeypatch):
+    obj, _armature = scenes.make_arm()
+    scenes.add_sinew(obj, "dq")
+    bpy.ops.ed.undo_push(message="before")
+    bpy.context.scene.render.fps += 1
+    bpy.ops.ed.undo_push(message="unrelated")
+    # What Sinew made between two steps is read again after the first.
+    bpy.ops.ed.undo()
+    bpy.context.view_layer.update()
+    applied, apply = [], apply_plan.apply
+    monkeypatch.setattr(apply_plan, "apply", lambda *given: applied.append(given) or apply(*given))
+    for step in (bpy.ops.ed.redo, bpy.ops.ed.undo, bpy.ops.ed.redo):
+        step()
+        bpy.context.view_layer.update()
+        assert session.plan_of(bpy.data.objects["Arm"]).state is State.IN_DEPSGRAPH
+    assert applied == []
 
 
 def test_what_is_kept_of_many_modifiers_is_of_each():

@@ -293,9 +293,9 @@ def weights_read(monkeypatch) -> list[str]:
     """The names of the meshes whose weights are read, one by one."""
     read, read_group_weights = [], mesh_io.read_group_weights
 
-    def count(mesh: bpy.types.Mesh) -> object:
+    def count(mesh: bpy.types.Mesh, *known: object) -> object:
         read.append(mesh.name)
-        return read_group_weights(mesh)
+        return read_group_weights(mesh, *known)
 
     monkeypatch.setattr(mesh_io, "read_group_weights", count)
     return read

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.deform import safe_mode, session
+from sinew_addon.deform import safe_mode, session, survey
 from sinew_addon.deform.plan import State
 
 pytestmark = pytest.mark.long_term
@@ -106,10 +106,12 @@ def test_a_button_makes_the_group_that_is_missing(name):
     mix.method, mix.group = "dq", name
     before = scenes.final_points(obj)
     if name:
-        assert any("nothing is mixed" in text for text in session.skinned_of(obj).bound.facts.warnings)
+        assert any(
+            "nothing is mixed" in text for text in survey.facts_of(obj, session.skinned_of(obj)).warnings
+        )
     assert bpy.ops.sinew.make_group(name=obj.name, stage="mix") == {"FINISHED"}
     assert mix.group == (name or "Mix")
-    assert session.skinned_of(obj).bound.facts.warnings == ()
+    assert survey.facts_of(obj, session.skinned_of(obj)).warnings == ()
     assert scenes.worst(scenes.final_points(obj), before) == 0.0
     obj.vertex_groups[mix.group].add(range(len(obj.data.vertices)), 1.0, "REPLACE")
     assert scenes.worst(scenes.final_points(obj), before) > 0.01

@@ -10,7 +10,7 @@ import reference
 import routes
 import scenes
 from sinew_addon.attach import attach
-from sinew_addon.deform import session
+from sinew_addon.deform import session, survey
 from sinew_addon.skinning import sdef
 
 pytestmark = pytest.mark.long_term
@@ -145,7 +145,7 @@ def test_that_mmd_tools_deforms_it_too_is_said():
     scenes.add_sinew(obj, "sdef")
     key = obj.shape_key_add(name="mmd_sdef_skinning", from_mix=False)
     scenes.rebind(obj)
-    assert any("unbind its SDEF" in text for text in session.skinned_of(obj).bound.facts.warnings)
+    assert any("unbind its SDEF" in text for text in survey.facts_of(obj, session.skinned_of(obj)).warnings)
     key.mute = True
     scenes.rebind(obj)
-    assert not any("unbind" in text for text in session.skinned_of(obj).bound.facts.warnings)
+    assert not any("unbind" in text for text in survey.facts_of(obj, session.skinned_of(obj)).warnings)

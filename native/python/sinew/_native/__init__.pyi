@@ -455,13 +455,14 @@ def stages() -> tuple[Stage, ...]:
     """All stages. `mix` is an argument of Deformer, each other a class: `bulge_limit` is BulgeLimit."""
 def thread_id() -> int:
     """A number that no other thread has as long as this one runs."""
-def weights_in_memory(address: typing.SupportsInt | typing.SupportsIndex, vertices: typing.SupportsInt | typing.SupportsIndex) -> tuple:
+def weights_in_memory(address: typing.SupportsInt | typing.SupportsIndex, vertices: typing.SupportsInt | typing.SupportsIndex, known: tuple[typing.Annotated[numpy.typing.ArrayLike, numpy.int32], typing.Annotated[numpy.typing.ArrayLike, numpy.int32], typing.Annotated[numpy.typing.ArrayLike, numpy.float32]] | None = None) -> tuple:
     """The vertex groups of a mesh, read from the memory of the Blender that this runs in: int32 [vertices], how
     many entries each vertex has; int32 [entries], the group of each, in the order of the vertices and as stored; float32
     [entries], its weight. ValueError where this can be no such memory.
 
     address   of the mesh's MDeformVert array, one for each vertex; a wrong one crashes the process or gives garbage
     vertices  how many
+    known     what this returned before: these very arrays are returned where the memory still has the same
     """
 __compiled_in__: str
 __version__: str
