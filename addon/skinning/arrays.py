@@ -69,5 +69,5 @@ def memory_of(elements: Any, width: int = 1, kind: type = np.float32) -> np.ndar
 def _array_at(address: int, shape: tuple[int, ...], kind: type) -> np.ndarray:
     """Cached, as Blender reuses the same memory for mesh after mesh, and the cache takes a tenth of the time
     of making the array."""
-    size = int(np.prod(shape)) * np.dtype(kind).itemsize
-    return np.ndarray(shape, kind, (ctypes.c_byte * size).from_address(address))
+    memory = (ctypes.c_byte * (int(np.prod(shape)) * np.dtype(kind).itemsize)).from_address(address)
+    return np.frombuffer(memoryview(memory), np.dtype(kind)).reshape(shape)
