@@ -173,7 +173,7 @@ def read(
     mesh_points = points
     if from_upstream:
         mesh_points = _finite(mesh_io.read_points(obj.data, known and known.mesh_points))
-    keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights)
+    keys = None if from_upstream else mesh_io.read_shape_keys(obj, weights, known and known.shape_keys)
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if len(mesh_points) != len(points):
         sdef_keys = None

@@ -258,8 +258,11 @@ def write_group_weights(obj: bpy.types.Object, rows: Mapping[int, Mapping[int, f
     obj.data.update_tag()
 
 
-def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys | None:
-    """Returns the relative shape keys of a mesh object, None where it has none.
+def read_shape_keys(
+    obj: bpy.types.Object, weights: GroupWeights, known: ShapeKeys | None = None
+) -> ShapeKeys | None:
+    """Returns the relative shape keys of a mesh object, None where it has none. Those that are the same are
+    the very arrays of `known`.
 
     Raises SinewError for absolute keys.
     """
@@ -270,17 +273,25 @@ def read_shape_keys(obj: bpy.types.Object, weights: GroupWeights) -> ShapeKeys |
         raise SinewError(
             f"{obj.name}: its shape keys are absolute, which Sinew does not mix; switch them to Relative"
         )
-    points = {block.name: read_key_points(block) for block in keys.key_blocks}
-    basis, names = keys.reference_key, obj.vertex_groups.keys()
-    moves: list[np.ndarray | None] = []
+    points = {}
     for block in keys.key_blocks:
+        memory = memory_of(block.points, 3)
+        points[block.name] = read_key_points(block) if memory is None else memory
+    basis, names = keys.reference_key, obj.vertex_groups.keys()
+    before = known.deltas if known is not None and known.names == tuple(points) else [None] * len(points)
+    moves: list[np.ndarray | None] = []
+    # One for all keys: the memory of new arrays takes longer than the arithmetic.
+    move = np.empty_like(points[basis.name])
+    for block, its_known in zip(keys.key_blocks, before, strict=True):
         if block == basis:
             moves.append(None)
             continue
-        move = points[block.name] - points[block.relative_key.name]
+        np.subtract(points[block.name], points[block.relative_key.name], out=move)
         mask = _mask_of(block, names, weights)
-        moves.append(move if mask is None else mask * move)
-    return ShapeKeys(tuple(points), points[basis.name], tuple(moves))
+        if mask is not None:
+            np.multiply(mask, move, out=move)
+        moves.append(_kept(move, its_known))
+    return ShapeKeys(tuple(points), _kept(points[basis.name], known and known.basis), tuple(moves))
 
 
 def _mask_of(block: bpy.types.ShapeKey, group_names: list[str], weights: GroupWeights) -> np.ndarray | None:
