@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: GPL-3.0-or-later
 """Copies, sets and clears properties and groups of them."""
 
+import functools
 from collections.abc import Iterable
 
 import bpy
@@ -54,14 +55,20 @@ def store(group: bpy.types.PropertyGroup, name: str, value: bool | int | float |
 def clear_pointers(group: bpy.types.PropertyGroup, target: bpy.types.ID) -> bool:
     """Clears the pointers to the target, also of groups within the group. Returns whether there were any."""
     found = False
-    for name, prop in group.bl_rna.properties.items():
-        if prop.type not in ("POINTER", "COLLECTION") or name == "rna_type":
-            continue
+    for name, kind in _references(type(group)):
         value = getattr(group, name)
         if value == target:
             setattr(group, name, None)
             found = True
-        for each in value if prop.type == "COLLECTION" else (value,):
+        for each in value if kind == "COLLECTION" else (value,):
             if isinstance(each, bpy.types.PropertyGroup):
                 found |= clear_pointers(each, target)
     return found
+
+
+@functools.cache
+def _references(group: type[bpy.types.PropertyGroup]) -> list[tuple[str, str]]:
+    """Returns the names and types of its properties that refer to something. Cached, as each undo asks."""
+    properties = group.bl_rna.properties.items()
+    kinds = ((name, prop.type) for name, prop in properties if name != "rna_type")
+    return [(name, kind) for name, kind in kinds if kind in ("POINTER", "COLLECTION")]
