@@ -20,7 +20,10 @@ from ..skinning.stage_mesh import Topology
 from .changes import Changes
 
 # What is read each time.
-_READ = ("weights", "points", "mesh_points", "sdef_keys", "topology", "shading", "shape_keys")
+_READ = (
+    *("weights", "points", "mesh_points", "sdef_keys"),
+    *("topology", "surface_topology", "shading", "shape_keys"),
+)
 
 
 @dataclass
@@ -34,6 +37,7 @@ class Source:
                       them takes long
     stored            vertex data of methods that is stored in the file, by its key; read along with triangles
     topology          faces and edges
+    surface_topology  those of the mesh that has surface_points
     shading           what else its normals depend on
     mesh_points       float32 [the mesh's vertices, 3], object space: the mesh's own, without upstream
                       modifiers
@@ -50,6 +54,7 @@ class Source:
     points: np.ndarray
     triangles: np.ndarray | None
     topology: Topology
+    surface_topology: Topology
     mesh_points: np.ndarray
     mesh: int
     shape_keys: ShapeKeys | None
@@ -125,9 +130,8 @@ class Source:
         for name in _READ:
             if self._has_same(other, name):
                 setattr(self, name, getattr(other, name))
-        # From upstream, it is not known whether the object's own mesh has the same faces.
-        has_same_faces = self.topology is other.topology and self.points is other.points
-        if has_same_faces and self.mesh == other.mesh and not (self.from_upstream or other.from_upstream):
+        has_same_faces = self.surface_topology is other.surface_topology and self.mesh == other.mesh
+        if has_same_faces and self.surface_points is other.surface_points:
             self.triangles, self.stored = other.triangles, other.stored
         self.keep_normals_of(other)
 
@@ -177,17 +181,17 @@ def read(
     sdef_keys = mesh_io.read_sdef_keys(obj.data)
     if len(mesh_points) != len(points):
         sdef_keys = None
-    topology = mesh_io.read_topology(mesh, known and known.topology)
+    topology = surface_topology = mesh_io.read_topology(mesh, known and known.topology)
+    if from_upstream and len(mesh_points) == len(points):
+        surface_topology = mesh_io.read_topology(obj.data, known and known.surface_topology)
     shading = mesh_io.read_shading(mesh, known and known.shading)
     domain = normals.domain_of(mesh)
-    surface = (points, None, topology, mesh_points, obj.data.session_uid)
+    surface = (points, None, topology, surface_topology, mesh_points, obj.data.session_uid)
     source = Source(names, weights, *surface, keys, sdef_keys, shading, from_upstream, domain)
     if known is not None:
         source.take_what_equals(known)
     if source.triangles is None and with_surface:
         source = _with_surface(obj, mesh, source)
-        if known is not None and are_equal(source.triangles, known.triangles):
-            source.triangles = known.triangles
     return known if known is not None and source.is_still(known) else source
 
 

@@ -35,7 +35,7 @@ def _is_known(obj: bpy.types.Object, skinned: SkinnedObject, depsgraph: bpy.type
     plan, evaluation = skinned.plan, skinned.evaluation
     return (
         plan.state is State.IN_DEPSGRAPH
-        and not (plan.lacks or plan.in_buffer or skinned.bound.source.from_upstream)
+        and not plan.lacks
         and not (skinned.needs_recheck or skinned.needs_plan)
         and not (evaluation.skip_reason or evaluation.user_error or evaluation.changed_unannounced)
         and obj.mode == skinned.noted.layout.mode == "OBJECT"

@@ -6,32 +6,36 @@ from collections.abc import Iterator
 import bpy
 import numpy as np
 
-from ..skinning.arrays import read
+from ..skinning.arrays import memory_of
 from . import mesh_io
 
 _SETTINGS = ("texspace_location", "texspace_size", "use_auto_texspace", "has_custom_normals")
 _KEY_SETTINGS = ("name", "mute", "vertex_group", "slider_min", "slider_max", "interpolation")
-# What an attribute's values are called, and how many numbers each has.
+# What an attribute's values are called, how many numbers each has, and of which kind they are in memory.
 _VALUES = {
-    "FLOAT": ("value", 1),
-    "INT": ("value", 1),
-    "INT8": ("value", 1),
-    "FLOAT_VECTOR": ("vector", 3),
-    "FLOAT2": ("vector", 2),
-    "FLOAT_COLOR": ("color", 4),
-    "BYTE_COLOR": ("color", 4),
-    "QUATERNION": ("value", 4),
-    "FLOAT4X4": ("value", 16),
-    "INT16_2D": ("value", 2),
-    "INT32_2D": ("value", 2),
+    "BOOLEAN": ("value", 1, np.bool_),
+    "FLOAT": ("value", 1, np.float32),
+    "INT": ("value", 1, np.int32),
+    "INT8": ("value", 1, np.int8),
+    "FLOAT_VECTOR": ("vector", 3, np.float32),
+    "FLOAT2": ("vector", 2, np.float32),
+    "FLOAT_COLOR": ("color", 4, np.float32),
+    "BYTE_COLOR": ("color", 4, np.uint8),
+    "QUATERNION": ("value", 4, np.float32),
+    "FLOAT4X4": ("value", 16, np.float32),
+    "INT16_2D": ("value", 2, np.int16),
+    "INT32_2D": ("value", 2, np.int32),
 }
 
 
 def are_alike(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> bool:
     """Whether modifiers make the same of both: their points, faces, attributes, weights, materials and shape
     keys, but for the values of the keys. Neither is in edit mode."""
-    return all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True)) and all(
-        np.array_equal(mine, its, equal_nan=mine.dtype.kind == "f")
+    if not all(mine == its for mine, its in zip(_facts(mesh), _facts(copy), strict=True)):
+        return False
+    weights = mesh_io.read_group_weights(mesh)
+    return mesh_io.read_group_weights(copy, weights).equals(weights) and all(
+        np.array_equal(_bits(mine), _bits(its))
         for mine, its in zip(_arrays(mesh), _arrays(copy), strict=True)
     )
 
@@ -65,24 +69,26 @@ def _facts(mesh: bpy.types.Mesh) -> Iterator[object]:
 
 
 def _arrays(mesh: bpy.types.Mesh) -> Iterator[np.ndarray]:
+    """Blender's own, where they can be had without a copy."""
     yield mesh_io.read_face_offsets(mesh)
-    weights = mesh_io.read_group_weights(mesh)
-    yield from (weights.counts, weights.groups, weights.weights)
     for attribute in mesh.attributes:
         yield _values_of(attribute)
     if mesh.has_custom_normals and mesh_io.find_attribute(mesh, mesh_io.CUSTOM_NORMALS) is None:
         yield mesh_io.corner_normals(mesh)
     for key in () if mesh.shape_keys is None else mesh.shape_keys.key_blocks:
-        yield mesh_io.read_key_points(key)
+        memory = memory_of(key.points, 3)
+        yield mesh_io.read_key_points(key) if memory is None else memory
 
 
 def _values_of(attribute: bpy.types.Attribute) -> np.ndarray:
-    if attribute.data_type == "BOOLEAN":
-        return read(attribute.data, "value", kind=bool)
-    if attribute.data_type not in _VALUES:
-        return np.array([each.value for each in attribute.data])
-    is_real = attribute.data_type.startswith(("FLOAT", "QUATERNION", "BYTE_COLOR"))
-    return read(attribute.data, *_VALUES[attribute.data_type], np.float32 if is_real else np.int32)
+    name, width, kind = _VALUES.get(attribute.data_type, ("value", 0, None))
+    memory = memory_of(attribute.data, width, kind) if width else None
+    return np.array([getattr(each, name) for each in attribute.data]) if memory is None else memory
+
+
+def _bits(values: np.ndarray) -> np.ndarray:
+    """Returns floats as whole numbers, by which a number equals itself that is not finite."""
+    return values.view(np.int32) if values.dtype == np.float32 else values
 
 
 def write_points(mesh: bpy.types.Mesh, copy: bpy.types.Mesh) -> None:

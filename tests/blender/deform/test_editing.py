@@ -368,9 +368,14 @@ def test_the_surface_is_read_once_however_often_methods_are_chosen(monkeypatch):
 
 
 @pytest.mark.by_sinew
-def test_an_undo_that_has_nothing_to_do_with_it_applies_nothing(monkeypatch):
+@pytest.mark.parametrize("kind", [None, "SMOOTH", "MIRROR"])
+def test_an_undo_that_has_nothing_to_do_with_it_applies_nothing(monkeypatch, kind):
     obj, _armature = scenes.make_arm()
+    if kind is not None:
+        scenes.put_in_front(obj, kind)
     scenes.add_sinew(obj, "dq")
+    bpy.context.scene.frame_set(6)
+    expected = scenes.final_points(obj)
     bpy.ops.ed.undo_push(message="before")
     bpy.context.scene.render.fps += 1
     bpy.ops.ed.undo_push(message="unrelated")
@@ -382,7 +387,9 @@ def test_an_undo_that_has_nothing_to_do_with_it_applies_nothing(monkeypatch):
     for step in (bpy.ops.ed.redo, bpy.ops.ed.undo, bpy.ops.ed.redo):
         step()
         bpy.context.view_layer.update()
-        assert session.plan_of(bpy.data.objects["Arm"]).state is State.IN_DEPSGRAPH
+        obj = bpy.data.objects["Arm"]
+        assert session.plan_of(obj).state is State.IN_DEPSGRAPH
+        np.testing.assert_array_equal(scenes.final_points(obj), expected)
     assert applied == []
 
 
