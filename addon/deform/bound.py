@@ -177,16 +177,6 @@ def _vertex_data(weighting: Weighting, read_now: Source, before: ModifierSkin | 
     return VertexData(weighting, read_now.surface_points, read_now.triangles, read_now.stored, old, given)
 
 
-def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, old: Bound) -> Bound:
-    """Returns the same with the mesh's triangles; nothing else is read.
-
-    Requires source.is_ready(), and that the mesh is the one that was read.
-    """
-    read_now = source.with_surface(obj, depsgraph, old.source)
-    read_now.keep_normals_of(old.source)
-    return replace(old, source=read_now)
-
-
 def lacks_surface(obj: bpy.types.Object, bound: Bound) -> bool:
     """Whether a method that needs the mesh's triangles was chosen since."""
     return bound.source.triangles is None and needs_surface(obj)

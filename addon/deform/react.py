@@ -17,7 +17,6 @@ class Reading(Enum):
     """What is read of an object that is brought up to date."""
 
     NOTHING = "nothing"
-    SURFACE = "surface"  # the triangles
     CHANGED = "changed"  # mesh, weights and bones; what did not change stays bound
     ALL = "all"
 
@@ -92,8 +91,7 @@ class Inputs:
 def reading_of(inputs: Inputs) -> Reading:
     if inputs.has_other_modifiers:
         return Reading.ALL
-    # While a shape key's slider moves, weights are read only at the next event.
-    waits = inputs.is_slider_moved and not inputs.lacks_surface
-    if inputs.have_bones_changed or (inputs.has_other_mesh and not waits):
-        return Reading.CHANGED
-    return Reading.SURFACE if inputs.lacks_surface else Reading.NOTHING
+    # While a shape key's slider moves, the mesh is read only at the next event.
+    has_other_mesh = inputs.has_other_mesh and not inputs.is_slider_moved
+    is_changed = inputs.have_bones_changed or has_other_mesh or inputs.lacks_surface
+    return Reading.CHANGED if is_changed else Reading.NOTHING

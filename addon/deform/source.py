@@ -4,7 +4,7 @@ upstream proxy."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 
 import bpy
@@ -191,21 +191,10 @@ def read(
     if known is not None:
         source.take_what_equals(known)
     if source.triangles is None and with_surface:
-        source = _with_surface(obj, mesh, source)
+        # Where points are moved upstream, Blender may split the quads of that mesh differently.
+        source.triangles = mesh_io.read_triangles(mesh if source.own_points is None else obj.data)
+        source.stored = stored_vertex_data.read(obj.data)
     return known if known is not None and source.is_still(known) else source
-
-
-def with_surface(obj: bpy.types.Object, depsgraph: bpy.types.Depsgraph, known: Source) -> Source:
-    """Adds to `known` what read() leaves out without `with_surface`. Requires is_ready()."""
-    mesh = upstream_proxy.evaluated_mesh(obj, depsgraph) if known.from_upstream else obj.data
-    return _with_surface(obj, mesh, known)
-
-
-def _with_surface(obj: bpy.types.Object, mesh: bpy.types.Mesh, source: Source) -> Source:
-    """mesh: the one that the Armature modifier gets; if its points are moved, Blender may split its quads
-    differently."""
-    triangles = mesh_io.read_triangles(mesh if source.own_points is None else obj.data)
-    return replace(source, triangles=triangles, stored=stored_vertex_data.read(obj.data))
 
 
 def has_changed(

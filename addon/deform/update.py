@@ -267,9 +267,7 @@ class _Event:
             lacks_surface=bound.lacks_surface(obj, skinned.bound),
         )
         reading = reading_of(self.inputs)
-        if reading is Reading.SURFACE:
-            skinned.bind(bound.with_surface(obj, depsgraph, skinned.bound))
-        elif reading is not Reading.NOTHING:
+        if reading is not Reading.NOTHING:
             old = skinned.bound if reading is Reading.CHANGED else None
             has_same_bones = not self.inputs.have_bones_changed
             skinned.bind(bound.read(obj, depsgraph, self.layout, old, has_same_bones))

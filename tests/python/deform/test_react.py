@@ -33,7 +33,7 @@ READINGS = [
     ({"has_other_mesh": True, "is_slider_moved": True}, Reading.NOTHING),
     ({"has_other_mesh": True, "is_slider_moved": True, "lacks_surface": True}, Reading.CHANGED),
     ({"have_bones_changed": True, "is_slider_moved": True}, Reading.CHANGED),
-    ({"lacks_surface": True}, Reading.SURFACE),
+    ({"lacks_surface": True}, Reading.CHANGED),
     ({"has_other_modifiers": True, "have_bones_changed": True}, Reading.ALL),
 ]
 
