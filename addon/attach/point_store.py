@@ -192,6 +192,14 @@ def clear_references(obj: bpy.types.Object) -> None:
         mark.node_group = None
 
 
+def references_of(obj: bpy.types.Object) -> list[int]:
+    """Returns the session_uid of all that it refers to because of Sinew, 0 for none."""
+    now, storage = layout.read(obj), properties.of(obj).storage
+    groups = [obj.modifiers[name].node_group for name in (now.sinew, now.mark) if name]
+    found = (storage.point_buffer, storage.upstream_proxy, *groups, *pose_driver.targets_of(obj))
+    return [0 if each is None else each.session_uid for each in found]
+
+
 def clear_references_to_itself(obj: bpy.types.Object) -> None:
     """Called after undo and redo, which read an object that changed into new memory. Where a deleted object
     was in that memory when the step was made, Blender (4.2 to 5.2) has pointers to it point to the object

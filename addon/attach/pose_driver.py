@@ -102,6 +102,11 @@ def _reads(driver: bpy.types.Driver, variables: list[_Variable]) -> bool:
     )
 
 
+def targets_of(obj: bpy.types.Object) -> list[bpy.types.ID | None]:
+    curve = _find(obj)
+    return [] if curve is None else [variable.targets[0].id for variable in curve.driver.variables]
+
+
 def remove(obj: bpy.types.Object) -> None:
     """Removes the driver, and the animation data if it had nothing else."""
     curve = _find(obj)

@@ -13,14 +13,20 @@ import bpy
 
 # The session_uid of each.
 _noted: set[int] = set()
-_is_between_steps = False
+# Whether Sinew works between two steps; None where it does not work.
+_is_between_steps: bool | None = None
 
 
 @contextmanager
-def between_steps() -> Iterator[None]:
-    """Context for what handlers and timers do. For operators and the panel, Blender makes an undo step."""
+def between_steps(is_between: bool = True) -> Iterator[None]:
+    """Context for what handlers and timers do. Within an operator or a change in the panel, for which Blender
+    makes an undo step, it is not between steps: the outermost context counts.
+
+    is_between  False for operators and the panel
+    """
     global _is_between_steps
-    before, _is_between_steps = _is_between_steps, True
+    before = _is_between_steps
+    _is_between_steps = is_between if before is None else before
     try:
         yield
     finally:
@@ -37,5 +43,9 @@ def noted() -> list[bpy.types.Object]:
     return [obj for obj in bpy.data.objects if obj.session_uid in _noted] if _noted else []
 
 
-def forget() -> None:
-    _noted.clear()
+def forget(obj: bpy.types.Object | None = None) -> None:
+    """obj: None for all"""
+    if obj is None:
+        _noted.clear()
+    else:
+        _noted.discard(obj.session_uid)

@@ -71,7 +71,6 @@ def before_loading(_may_react: bool) -> None:
 def on_loaded(*_args: object) -> None:
     with updates_suspended():
         session.forget()
-        # The file's first undo step comes after this.
         references.forget()
         overrides.restore()
         note.remove()
@@ -84,6 +83,8 @@ def on_loaded(*_args: object) -> None:
         if obj.animation_data is not None:
             obj.update_tag(refresh={"TIME"})
     session.refresh(bpy.context)
+    # The file's first undo step comes after this.
+    references.forget()
 
 
 # --- Saving
@@ -91,11 +92,14 @@ def on_loaded(*_args: object) -> None:
 
 @dataclass
 class _Saving:
-    """on_before  the session_uid of objects that Sinew deformed before the file was prepared
-    failures   what failed for an object when the file was saved last, by its session_uid
+    """on_before   the session_uid of objects that Sinew deformed before the file was prepared
+    references  what objects referred to by then, as from point_store.references_of(), by their session_uid;
+                without those that had been given it since the last undo step
+    failures    what failed for an object when the file was saved last, by its session_uid
     """
 
     on_before: set[int] = field(default_factory=set)
+    references: dict[int, list[int]] = field(default_factory=dict)
     failures: dict[int, str] = field(default_factory=dict)
 
 
@@ -115,6 +119,12 @@ def on_save(*_args: object) -> None:
         return
     # So that the artist's last changes are seen separately from those made for saving.
     bpy.context.evaluated_depsgraph_get()
+    noted = references.noted()
+    _saving.references = {
+        obj.session_uid: point_store.references_of(obj)
+        for obj in session.objects_with_sinew()
+        if obj not in noted
+    }
     # First, so that whatever happens, on_saved() reverses it.
     phase.is_saving = True
     prepare_for_save()
@@ -128,6 +138,10 @@ def on_saved(*_args: object) -> None:
         phase.is_saving = False
     with references.between_steps():
         resume_after_save(bpy.context)
+    # What they refer to as before is in the last step.
+    for obj in references.noted():
+        if _saving.references.get(obj.session_uid) == point_store.references_of(obj):
+            references.forget(obj)
 
 
 def prepare_for_save() -> None:

@@ -95,10 +95,17 @@ EDITS = {
     "pose": lambda arm: scenes.bend(attach.armature_of(arm), 70.0),
     "added object": lambda arm: scenes.added("Empty", None),
     "added modifier": lambda arm: setattr(arm.modifiers.new("Behind", "SMOOTH"), "show_viewport", False),
+    "modifier in front": lambda arm: _in_front(arm),
 }
 
 
-def _opened_again(tmp_path, edit):
+def _in_front(arm):
+    for modifier in arm.modifiers:
+        if modifier.type == "CAST":
+            modifier.factor = 0.9
+
+
+def _opened_again(tmp_path, edit, front):
     """Two arms in a newly opened file: Sinew has replaced modifiers that are in the first undo step."""
     arm, _rig = scenes.make_arm()
     other, _rig = scenes.make_arm(name="Other")
@@ -107,6 +114,8 @@ def _opened_again(tmp_path, edit):
         arm.shape_key_add()
         arm.shape_key_add(name="Key 1").value = 1.0
     for obj in (arm, other):
+        if front is not None:
+            scenes.put_in_front(obj, front)
         scenes.add_sinew(obj, "dq")
     bpy.context.scene.frame_set(7)
     bpy.context.view_layer.objects.active = arm
@@ -156,9 +165,10 @@ def test_undo_that_takes_another_object_for_the_object(route, helper):
 
 
 @pytest.mark.parametrize("route", [routes.EVALUATION], indirect=True)
+@pytest.mark.parametrize("front", [None, "CAST", "MIRROR"])
 @pytest.mark.parametrize("edit", EDITS)
-def test_what_a_step_leaves_alone_is_not_read_again(route, edit, tmp_path):
-    _opened_again(tmp_path, edit)
+def test_what_a_step_leaves_alone_is_not_read_again(route, edit, front, tmp_path):
+    _opened_again(tmp_path, edit, front)
     # All meshes are reported after undo of a file's first step.
     for each in ("pose", edit):
         EDITS[each](bpy.data.objects["Arm"])
@@ -178,6 +188,39 @@ def test_what_a_step_leaves_alone_is_not_read_again(route, edit, tmp_path):
         assert session.skinned_of(bpy.data.objects["Arm"]) is not None
         bpy.ops.ed.redo()
         bpy.context.view_layer.update()
+    arm = bpy.data.objects["Arm"]
+    shape = scenes.final_points(arm)
+    session.forget_object(arm)
+    session.refresh(bpy.context)
+    np.testing.assert_allclose(scenes.final_points(arm), shape, rtol=0, atol=1e-6)
+
+
+@pytest.mark.parametrize("route", [routes.EVALUATION], indirect=True)
+@pytest.mark.parametrize("front", [None, "CAST"])
+@pytest.mark.parametrize("event", ["added", "saved", "opened"])
+def test_what_sinew_makes_for_a_step_or_restores_stays_over_the_steps_after_it(route, front, event, tmp_path):
+    arm, _rig = scenes.make_arm()
+    if front is not None:
+        scenes.put_in_front(arm, front)
+    scenes.add_sinew(arm, "dq")
+    bpy.context.scene.frame_set(7)
+    shape = scenes.final_points(arm)
+    if event == "opened":
+        scenes.reopened(tmp_path / "undo.blend")
+        bpy.context.view_layer.update()
+    bpy.ops.ed.undo_push(message="first")
+    if event == "saved":
+        bpy.ops.wm.save_as_mainfile(filepath=str(tmp_path / "undo.blend"))
+        bpy.context.view_layer.update()
+    bpy.context.scene.render.fps += 1
+    bpy.ops.ed.undo_push(message="unrelated")
+    known = session.skinned_of(bpy.data.objects["Arm"])
+    for step in (bpy.ops.ed.undo, bpy.ops.ed.redo, bpy.ops.ed.undo):
+        step()
+        bpy.context.view_layer.update()
+        arm = bpy.data.objects["Arm"]
+        assert session.skinned_of(arm) is known
+        np.testing.assert_array_equal(scenes.final_points(arm), shape)
 
 
 def test_what_a_handler_behind_sinews_changes_in_the_event_of_an_undo(route):
