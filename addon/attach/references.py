@@ -13,20 +13,14 @@ import bpy
 
 # The session_uid of each.
 _noted: set[int] = set()
-# Whether Sinew works between two steps; None where it does not work.
-_is_between_steps: bool | None = None
+_is_between_steps = False
 
 
 @contextmanager
-def between_steps(is_between: bool = True) -> Iterator[None]:
-    """Context for what handlers and timers do. Within an operator or a change in the panel, for which Blender
-    makes an undo step, it is not between steps: the outermost context counts.
-
-    is_between  False for operators and the panel
-    """
+def between_steps() -> Iterator[None]:
+    """Context for what handlers and timers do. For operators and the panel, Blender makes an undo step."""
     global _is_between_steps
-    before = _is_between_steps
-    _is_between_steps = is_between if before is None else before
+    before, _is_between_steps = _is_between_steps, True
     try:
         yield
     finally:
@@ -44,7 +38,10 @@ def noted() -> list[bpy.types.Object]:
 
 
 def forget(obj: bpy.types.Object | None = None) -> None:
-    """obj: None for all"""
+    """Called where an undo step has, or will have, what was recorded.
+
+    obj  None for all
+    """
     if obj is None:
         _noted.clear()
     else:

@@ -209,18 +209,16 @@ def refresh(context: bpy.types.Context, changed: bpy.types.Object | None = None)
         current.objects = None
         for obj, skinned in living_pairs():
             skinned.needs_plan |= changed is None or obj.session_uid == changed.session_uid
-    with references.between_steps(False):
-        # Handlers react to this evaluation by themselves, in time for what others' later handlers change.
-        # What these change of objects that are deformed after the update is only there at its end.
-        depsgraph = context.evaluated_depsgraph_get()
-        update_all(depsgraph, Changes())
-        # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
-        if bpy.app.background:
-            # If no object waits, this evaluation only shows what was just changed, to which Sinew need not
-            # react.
-            with contextlib.nullcontext() if without_upstream() else updates_suspended():
-                context.view_layer.update()
-            note_shown(depsgraph)
+    # Handlers react to this evaluation by themselves, in time for what others' later handlers change. What
+    # these change of objects that are deformed after the update is only there at its end.
+    depsgraph = context.evaluated_depsgraph_get()
+    update_all(depsgraph, Changes())
+    # In a window the tagged meshes are evaluated before the next redraw; a script may read them at once.
+    if bpy.app.background:
+        # If no object waits, this evaluation only shows what was just changed: Sinew need not react to it.
+        with contextlib.nullcontext() if without_upstream() else updates_suspended():
+            context.view_layer.update()
+        note_shown(depsgraph)
     upstream_proxy.compared.clear()
 
 

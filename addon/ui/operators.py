@@ -6,7 +6,7 @@ from typing import ClassVar
 
 import bpy
 
-from ..attach import attach, corrective_smooth, properties, stack, stage_settings
+from ..attach import attach, corrective_smooth, properties, references, stack, stage_settings
 from ..attach.feature import Feature
 from ..attach.layout import parent_deforms
 from ..attach.stage_settings import method_items
@@ -147,6 +147,13 @@ class Acting(Named):
     def poll(cls, context: bpy.types.Context) -> bool:
         return cls._can_run(cls.refusal(context) or waits_for_render())
 
+    def execute(self, context: bpy.types.Context) -> set[str]:
+        result = super().execute(context)
+        if self.options.is_invoke and result == {"FINISHED"}:
+            # Blender makes an undo step now, but not where a script has called it.
+            references.forget()
+        return result
+
 
 class OnSinewObjects(Acting):
     @classmethod
@@ -249,7 +256,7 @@ class SINEW_OT_add(Acting, OfOneMesh, bpy.types.Operator):
             self.method = addon_preferences.value("first_method", default=AS_BEFORE)
         return self.execute(context)
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         method = None if self.method in (AS_BEFORE, RECOMMENDED) else self.method
         objects = self.meant([obj for obj in targets(context) if not properties.has_sinew(obj)])
         followers = [obj for obj in sinew_targets(context) if not properties.of(obj).is_own]
@@ -275,7 +282,7 @@ class SINEW_OT_rebind(OnSinewObjects, OfOneMesh, bpy.types.Operator):
     bl_label = "Rebind"
     bl_description = "Read meshes, weights and bones anew, and switch on again after an error"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
         with updates_suspended():
             result = _for_each(self, objects, session.read_again, "Rebound")
@@ -293,7 +300,7 @@ class SINEW_OT_remove(OnSinewObjects, OfOneMesh, bpy.types.Operator):
         "Take Sinew off all meshes of the character and give their Armature modifiers back as they were"
     )
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
         return _for_each(self, objects, attach.remove, "Removed Sinew from")
 
@@ -315,7 +322,7 @@ class SINEW_OT_take_over_smooth(OnSinewObjects, OfOneMesh, bpy.types.Operator):
         on.sort(key=lambda obj: corrective_smooth.candidate(obj) is None)
         return f"{on[0].name}: {tr(corrective_smooth.why_none(on[0]))}" if on else "Switch Sinew on first"
 
-    def execute(self, context: bpy.types.Context) -> set[str]:
+    def run(self, context: bpy.types.Context) -> set[str]:
         objects = self.meant(sinew_targets(context))
         if not self.name:
             objects = [obj for obj in objects if can_take_over(obj)]

@@ -227,6 +227,10 @@ def fresh(run: Run) -> Steps:
     click("sinew.add", "Hero")
     hero().sinew.method = "dq"
     click("sinew.add", "Small")
+    # Here, as the extension was installed only now.
+    from bl_ext.user_default.sinew.attach import references
+
+    run.check(not references.noted(), "what an operator made is taken for made between undo steps")
     for name in ("Front", "Late"):
         click("sinew.add", name)
         bpy.data.objects[name].sinew.method = "dq"
