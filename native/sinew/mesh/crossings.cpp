@@ -22,10 +22,17 @@ struct Box {
     Vec3<float> low, high;
 };
 
-/// Without branches: which of the comparisons fails can not be predicted.
+/// Whether two ranges have nothing in common, as a number: without branches, as it can not be predicted which of the
+/// comparisons fails.
+int are_apart(float low, float high, float other_low, float other_high) noexcept {
+    return static_cast<int>(low > other_high) | static_cast<int>(other_low > high);
+}
+
 bool meet(const Box& a, const Box& b) noexcept {
-    const auto apart = [&](int axis) { return (a.low[axis] > b.high[axis]) | (b.low[axis] > a.high[axis]); };
-    return !(apart(0) | apart(1) | apart(2));
+    const auto apart = [&](int axis) {
+        return are_apart(a.low[axis], a.high[axis], b.low[axis], b.high[axis]);
+    };
+    return (apart(0) | apart(1) | apart(2)) == 0;
 }
 
 Box around(const Box& a, const Box& b) noexcept { return {glm::min(a.low, b.low), glm::max(a.high, b.high)}; }
@@ -79,10 +86,10 @@ public:
     /// boxes  of triangles, by their place in the order
     Tree(std::span<const Box> boxes, std::span<const Place> order) : boxes_(boxes), order_(order) {
         nodes_.reserve(boxes.size());
-        for (int axis = 0; axis < 3; ++axis) {
+        for (std::size_t axis = 0; axis < 3; ++axis) {
             for (const Box& box : boxes) {
-                lows_[axis].push_back(box.low[axis]);
-                highs_[axis].push_back(box.high[axis]);
+                lows_[axis].push_back(box.low[static_cast<int>(axis)]);
+                highs_[axis].push_back(box.high[static_cast<int>(axis)]);
             }
             // The last leaf is read as if it were full.
             lows_[axis].resize(boxes.size() + kMostInLeaf);
@@ -122,9 +129,11 @@ private:
             std::array<std::int32_t, kMostInLeaf> apart;
             for (std::size_t k = 0; k < kMostInLeaf; ++k) {
                 apart[k] = 0;
-                for (int axis = 0; axis < 3; ++axis) {
-                    const float low = lows_[axis][other.begin + k], high = highs_[axis][other.begin + k];
-                    apart[k] |= (box.low[axis] > high) | (low > box.high[axis]);
+                for (std::size_t axis = 0; axis < 3; ++axis) {
+                    const float low = box.low[static_cast<int>(axis)],
+                                high = box.high[static_cast<int>(axis)];
+                    apart[k] |=
+                        are_apart(low, high, lows_[axis][other.begin + k], highs_[axis][other.begin + k]);
                 }
             }
             for (std::size_t k = place < other.begin ? 0 : place + 1 - other.begin; k < count; ++k) {

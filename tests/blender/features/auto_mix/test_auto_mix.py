@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 import scenes
 from sinew_addon.attach import properties
-from sinew_addon.deform import session
+from sinew_addon.deform import session, survey
 from sinew_addon.features.auto_mix import auto_mix
 from sinew_addon.features.auto_mix.shares import VertexErrors
 
@@ -93,7 +93,7 @@ def test_it_is_better_than_either_method(method, second):
     at_rest = scenes.final_points(obj)
     assert bpy.ops.sinew.auto_mix() == {"FINISHED"}
     assert (mix.method, mix.group) == (second, "Mix")
-    assert session.skinned_of(obj).bound.facts.warnings == ()
+    assert survey.facts_of(obj, session.skinned_of(obj)).warnings == ()
     assert scenes.worst(scenes.final_points(obj), at_rest) < 1e-6
     mixed = worst(obj)
     # Shares of the better method's worst value.

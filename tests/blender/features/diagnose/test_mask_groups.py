@@ -130,8 +130,8 @@ def test_while_sinew_is_at_work():
     obj.vertex_groups.new(name=GROUP).add([1, 2, 3], 1.0, "REPLACE")
     obj.modifiers["Armature"].vertex_group = GROUP
     scenes.add_sinew(obj, "dq")
-    assert session.skinned_of(obj).bound.facts.warnings == ()
+    assert survey.facts_of(obj, session.skinned_of(obj)).warnings == ()
     obj.modifiers["Armature"].vertex_group = ""
     bpy.context.view_layer.update()
     scenes.rebind(obj)
-    assert any(GROUP in warning for warning in session.skinned_of(obj).bound.facts.warnings)
+    assert any(GROUP in warning for warning in survey.facts_of(obj, session.skinned_of(obj)).warnings)
