@@ -10,14 +10,10 @@ vertex mapping" in Blender's developer documentation and its change 110758, whos
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
+from .bones import RestBones
 from .influences import Influences, offsets_of, owners_of
-
-if TYPE_CHECKING:
-    from .rig import Bones
 
 # The curved mapping's smoothing: its width at the middle plane, how fast the correction towards the ideal
 # slope grows, and how sharply it ends.
@@ -28,7 +24,7 @@ _HALVINGS = 30
 _NOTHING, _BEYOND = 1e-7, 0.02
 
 
-def spread_over_joints(influences: Influences, points: np.ndarray, rig: Bones) -> Influences:
+def spread_over_joints(influences: Influences, points: np.ndarray, rig: RestBones) -> Influences:
     """Returns the influences, with each influence of a bendy bone split between the two joints nearest to the
     vertex: along the bone's curve at rest, or along its straight line.
 

@@ -5,15 +5,13 @@ from __future__ import annotations
 
 import re
 from math import sqrt
-from typing import TYPE_CHECKING, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
 
 from ..base.names import MADE_BONES
+from .bones import RestBones
 from .influences import Influences
-
-if TYPE_CHECKING:
-    from .rig import Bones
 
 # Words of bones' names, in the common rigs: Rigify, Mixamo, Unreal, MakeHuman, MikuMikuDance.
 UPPER = r"upper_?arm|up_?arm|thigh|up_?leg|upper_?leg|femur|humerus"
@@ -77,7 +75,7 @@ class Limbs(NamedTuple):
     by_skin: np.ndarray
 
 
-def find_limbs(bones: Bones) -> Limbs:
+def find_limbs(bones: RestBones) -> Limbs:
     """The limb of a bone ends at the joint that the bone carries. Without one, it is the bone itself, where
     what carries the bone is along its limb. Else it is as those of what carries it, in the bones' own axes,
     where these are alike; or it goes to the middle of the skin that the bone moves, and as far beyond."""
@@ -85,7 +83,7 @@ def find_limbs(bones: Bones) -> Limbs:
 
 
 class _Finder:
-    def __init__(self, bones: Bones) -> None:
+    def __init__(self, bones: RestBones) -> None:
         self._bones = bones
         rest = bones.rest[: len(bones.names)].astype(np.float64)
         self._axes, self._heads = rest[:, :3, :3], rest[:, :3, 3]

@@ -5,15 +5,12 @@ from __future__ import annotations
 
 import re
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 
 from ..base.phrases import phrase
-from .limbs import ARM, END, LEG, LOWER, MADE, NEAR, NEITHER, OWN_TWIST, STRAIGHT, UPPER, words_of
-
-if TYPE_CHECKING:
-    from .rig import Bones
+from .bones import RestBones
+from .limbs import ARM, END, LEG, LOWER, MADE, NEAR, NEITHER, OWN_TWIST, STRAIGHT, UPPER, Limbs, words_of
 
 
 @dataclass(frozen=True)
@@ -36,11 +33,11 @@ class Twists:
 
 
 class TwistFinder:
-    def __init__(self, bones: Bones) -> None:
+    def __init__(self, bones: RestBones, limbs: Limbs) -> None:
         self._names, self._deform, self._parents = bones.names, bones.deform, bones.parents
         self._segments, self._children = bones.segments, bones.children
         self._deforming_parents = bones.deforming_parents
-        self._limbs, self._known = bones.limbs.vectors, bones.limbs.known
+        self._limbs, self._known = limbs.vectors, limbs.known
         rest = bones.rest[: len(bones.names)].astype(np.float64)
         self._heads, self._own = rest[:, :3, 3], bones.lengths[:, None] * rest[:, :3, 1]
         self._left_out: list[str] = []
