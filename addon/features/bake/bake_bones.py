@@ -314,6 +314,8 @@ def _rig_of(obj: bpy.types.Object) -> bpy.types.Object:
     animation = rig.animation_data
     if animation is not None and animation.use_tweak_mode:
         raise SinewError(f"{rig.name}: a strip of its NLA is being edited; leave tweak mode first")
+    if rig.data.pose_position == "REST":
+        raise SinewError(f"{rig.name}: is in Rest Position, where no bone moves; switch to Pose Position")
     if rig.name not in bpy.context.view_layer.objects:
         raise SinewError(f"{rig.name}: is not in this view layer, where bones could be added")
     return rig

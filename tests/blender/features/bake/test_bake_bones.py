@@ -239,7 +239,7 @@ def test_errors_before_and_after_as_heat_maps(arm, motion):
     assert bake_error.scale_of(settings, [obj]).high <= 0.5 * most
 
 
-@pytest.mark.parametrize("of", ["two modifiers", "in front", "linked"])
+@pytest.mark.parametrize("of", ["two modifiers", "in front", "rest", "linked"])
 def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     obj, path = arm
     rig = obj.modifiers["Armature"].object
@@ -247,6 +247,8 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
         obj.modifiers.new("Second", "ARMATURE").object = rig
     elif of == "in front":
         scenes.put_in_front(obj, "MIRROR", "Mirror")
+    elif of == "rest":
+        rig.data.pose_position = "REST"
     else:
         scenes.save(path)
         obj = scenes.copied(scenes.link(path, "Arm", "Arm Rig")[0], linked=True)
@@ -254,6 +256,7 @@ def test_what_bones_can_not_reproduce_is_refused(arm, tmp_path, of):
     sentence = {
         "two modifiers": "has several Armature modifiers",
         "in front": "Mirror changes the mesh ahead of the armature",
+        "rest": "is in Rest Position",
         "linked": "is linked, and can not have bones of its own",
     }[of]
     with pytest.raises(SinewError, match=sentence):
