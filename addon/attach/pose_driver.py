@@ -103,6 +103,7 @@ def _reads(driver: bpy.types.Driver, variables: list[_Variable]) -> bool:
 
 
 def targets_of(obj: bpy.types.Object) -> list[bpy.types.ID | None]:
+    """Returns what the driver's variables read, in their order; empty without a driver."""
     curve = _find(obj)
     return [] if curve is None else [variable.targets[0].id for variable in curve.driver.variables]
 

@@ -139,7 +139,7 @@ def on_saved(*_args: object) -> None:
     with references.between_steps():
         resume_after_save(bpy.context)
     # What they refer to as before is in the last step.
-    for obj in references.noted():
+    for obj in filter(properties.has_sinew, references.noted()):
         if _saving.references.get(obj.session_uid) == point_store.references_of(obj):
             references.forget(obj)
 

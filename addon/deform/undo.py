@@ -2,9 +2,9 @@
 """Keeps what is known of objects over undo and redo: binding them again takes longer than the step.
 
 Blender keeps in memory what is the same in both steps, and lists everything else in the next evaluation. So
-an object stays known if Sinew deforms it within the evaluation, from its own mesh alone, and if it was shown
-before the step and after it. Listed data is read again; bones, and what the artist can change about the
-object itself, are always compared.
+an object stays known if Sinew deforms it within the evaluation, and if it was shown before the step and after
+it. Listed data is compared with what was read; bones, and what the artist can change about the object itself,
+always are.
 """
 
 import bpy
